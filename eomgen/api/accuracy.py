@@ -1,6 +1,7 @@
 """Work-precision measurements and rounding errors: `accuracy`, `arithmetic`."""
 
 import time as clock
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from eomgen.api.inputs import in_formulas
 from eomgen.api.options import AccuracyOptions, ArithmeticOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.base.options import taking
 from eomgen.model.elaborate import in_order
@@ -36,8 +38,8 @@ Notice = Callable[[int, float, "Setting"], None]
 """Called before each run: number of runs so far, the time they took, s, and the next run."""
 
 
-@dataclass(frozen=True, eq=False)
-class Accuracy:
+@dataclass(frozen=True, eq=False, repr=False)
+class Accuracy(Displayed):
     """Time and error of runs of one motion by several methods.
 
     works       the runs, by method and from coarse to fine: setting, error, time, counts
@@ -49,6 +51,14 @@ class Accuracy:
     left_out    methods whose finer runs were not made, for lack of time
     """
 
+    shown = (
+        "t_end",
+        "methods",
+        "works",
+        "left_out",
+        "reference",
+    )
+
     works: "tuple[Work, ...]"
     reference: "Reference"
     costs: tuple[float, float]
@@ -56,6 +66,11 @@ class Accuracy:
     t_end: float
     made: int
     left_out: tuple[str, ...]
+
+    @property
+    def methods(self) -> dict[str, int]:
+        """How many runs were made by each method."""
+        return dict(Counter(work.setting.integrator for work in self.works))
 
 
 @dataclass(frozen=True, eq=False)

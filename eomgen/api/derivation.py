@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from eomgen.api.options import check_seed
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.tape import TIME
@@ -23,8 +24,8 @@ NUMBERS = (
 """How to compute M, V, G and F of a `scene` where they are not written out."""
 
 
-@dataclass(frozen=True)
-class Derivation:
+@dataclass(frozen=True, repr=False)
+class Derivation(Displayed):
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
@@ -32,6 +33,11 @@ class Derivation:
     module. A mechanism whose steps are those of an algorithm has none; the functions
     `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
     """
+
+    shown = (
+        "title",
+        "steps",
+    )
 
     model: Model
     exposition: "Exposition"
@@ -59,17 +65,17 @@ class Derivation:
     @property
     def M(self) -> "Expr":
         """Mass matrix, (nv, nv), symmetric."""
-        return self.matrices.M
+        return self.matrices.M.as_immutable()
 
     @property
     def V(self) -> "Expr":
         """Velocity-dependent forces (Coriolis and centrifugal), (nv, 1), on the left side."""
-        return self.matrices.V
+        return self.matrices.V.as_immutable()
 
     @property
     def G(self) -> "Expr":
         """Gravity forces, (nv, 1), on the left side."""
-        return self.matrices.G
+        return self.matrices.G.as_immutable()
 
     @property
     def F(self) -> "Expr":
@@ -78,14 +84,14 @@ class Derivation:
         Forces of effects that depend on the motion are symbols in it; `written_out` puts their
         expressions in place.
         """
-        return self.matrices.F
+        return self.matrices.F.as_immutable()
 
     @property
     def vd(self) -> "Expr":
         """The accelerations v̇ = M⁻¹ (F - V - G), (nv, 1), written out as `solution` is."""
         import sympy as sp
 
-        return sp.Matrix(list(self.solution.values()))
+        return sp.ImmutableMatrix(list(self.solution.values()))
 
     @property
     def symbols(self) -> "dict[str, Expr]":

@@ -59,7 +59,7 @@ def film(options: Filming) -> Path:
     return filmed(run.trajectory, run.motion, path, options, options.progress).path
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Run(Simulated):
     """The result of a simulation.
 
@@ -78,6 +78,20 @@ class Run(Simulated):
     inputs      constant inputs that are not their defaults
     varying     whether inputs were tables or functions of time
     """
+
+    shown = (
+        "states",
+        "t",
+        "y",
+        "finished",
+        "message",
+        "begun",
+        "error",
+        "saved",
+        "excursions",
+        "warnings",
+        "options",
+    )
 
     motion: "Motion"
     options: str

@@ -11,6 +11,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, check_name, model_of, read
 from eomgen.api.options import BACKENDS, Backend, check_time
 from eomgen.api.public import public
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
@@ -123,7 +124,7 @@ class _Reset(NamedTuple):
     first: FloatArray
 
 
-class Stepper:
+class Stepper(Displayed):
     """Steps of equal length of a scene: see `stepper`.
 
     states, inputs, parameters  their names, in the order of rows
@@ -135,6 +136,8 @@ class Stepper:
     Calls do not depend on one another, and several threads may make them at once: the interpreter's
     lock is released in compiled code.
     """
+
+    shown = ("method", "dt", "lanes", "states", "inputs", "parameters", "compiled", "notice")
 
     def __init__(
         self,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import SceneError
 from eomgen.derivation.exposition import Exposition, exposition_of
 from eomgen.derivation.matrices import Matrices, written_out, written_size
@@ -53,11 +54,16 @@ class Question:
         return sp.Float(f"{float(number):.4g}")
 
 
-@dataclass(frozen=True)
-class Exercise:
+@dataclass(frozen=True, repr=False)
+class Exercise(Displayed):
     """Questions on a mechanism. `known` are the names that answers may use, `arms` those that are
     not as the scene has them.
     """
+
+    shown = (
+        "questions",
+        "known",
+    )
 
     model: Model
     questions: tuple[Question, ...]

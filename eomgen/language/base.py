@@ -19,6 +19,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from eomgen.base.errors import nearest
+from eomgen.base.frozen import FrozenDict
 from eomgen.language.angles import by_unit, radians_of
 from eomgen.language.formula import Formula
 
@@ -66,21 +67,6 @@ class Table(BaseModel):
         """A copy with some fields replaced by values of the right type, which are not checked."""
         _freeze(values)
         return self.model_copy(update=values)
-
-
-class FrozenDict(dict[Any, Any]):
-    """A dictionary that does not change, of a value that does not."""
-
-    def _refuse(self, *_: Any, **named: Any) -> Any:
-        raise TypeError("these values are frozen; make a copy with dict(…) and change that")
-
-    __setitem__ = __delitem__ = __ior__ = update = pop = popitem = clear = setdefault = _refuse
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(frozenset(self.items()))
-
-    def __reduce__(self) -> tuple[type, tuple[dict[Any, Any]]]:
-        return type(self), (dict(self),)
 
 
 def _freeze(fields: dict[str, Any]) -> None:

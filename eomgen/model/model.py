@@ -3,12 +3,12 @@
 import hashlib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import accumulate
 
 from eomgen.base.displays import Displayed
-from eomgen.language.base import FrozenDict
+from eomgen.base.frozen import FrozenDict
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
@@ -166,7 +166,7 @@ class JointIndex:
         return self.v[self.body.plain :]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model(Displayed):
     """A mechanism and the effects that act on it, without drawing and integration settings.
 
@@ -185,6 +185,19 @@ class Model(Displayed):
     groups      what determines the coordinates that follow from the others in closed form, in the
                 order in which they are solved; () if they are states too
     """
+
+    shown = (
+        "title",
+        "dimensions",
+        "freedom",
+        "bodies",
+        "states",
+        "inputs",
+        "parameters",
+        "effects",
+        "constraints",
+        "notices",
+    )
 
     name: str
     title: str
@@ -216,7 +229,8 @@ class Model(Displayed):
     @cached_property
     def digest(self) -> bytes:
         """A digest of all but the notices: of a large model it takes longer than a short run."""
-        return hashlib.sha256(repr(replace(self, notices=())).encode()).digest()
+        parts = [getattr(self, each.name) for each in fields(self) if each.name != "notices"]
+        return hashlib.sha256(repr(parts).encode()).digest()
 
     @cached_property
     def every_row(self) -> tuple[tuple[str, str], ...]:

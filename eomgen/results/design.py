@@ -7,7 +7,9 @@ from statistics import NormalDist
 
 import numpy as np
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
+from eomgen.base.frozen import Frozen
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 
@@ -17,14 +19,19 @@ Values = Sequence[float] | FloatArray
 LAWS = ("uniform", "normal", "loguniform")
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Frozen, Displayed):
     """The values of the members.
 
     names   what is varied
     values  (n, k): one row a member, one column a name
     axes    of a grid, the values along each axis, the last of which varies fastest; else empty
     """
+
+    shown = (
+        "names",
+        "values",
+    )
 
     names: tuple[str, ...]
     values: FloatArray
@@ -81,7 +88,7 @@ def listed(values: Mapping[str, Values]) -> Design:
 def grid(axes: Mapping[str, Values]) -> Design:
     """All combinations of the values of each name. Raises `RunError` if there are no
     members or too many, or if a value is not finite."""
-    columns = tuple(np.atleast_1d(np.asarray(axis, dtype=float)) for axis in axes.values())
+    columns = tuple(np.atleast_1d(np.array(axis, dtype=float)) for axis in axes.values())
     count = math.prod(len(column) for column in columns)
     if not columns or not 0 < count <= MOST:
         raise RunError(f"vary: makes {count if columns else 0} members; 1 to {MOST} are possible")

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError, nearest
+from eomgen.base.frozen import Frozen
 from eomgen.language.base import identifier
 from eomgen.results.design import Design
 from eomgen.results.labelled import need_package
@@ -25,8 +27,8 @@ MOST_NUMBERS = 2**22
 """Greatest number of numbers of which statistics are computed at once."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ensemble(Frozen, Displayed):
     """The runs of n members. If they are kept in a folder, arrays are memory maps of its files:
     what is not used stays on disk.
 
@@ -43,6 +45,17 @@ class Ensemble:
     outputs    functions of the module by name: (n, m, …) at these times, or (n, …) at the end
     units      units by name, as far as known
     """
+
+    shown = (
+        "scene",
+        "design",
+        "states",
+        "ended",
+        "t",
+        "final",
+        "times",
+        "outputs",
+    )
 
     scene: str
     design: Design
@@ -63,6 +76,11 @@ class Ensemble:
     def finished(self) -> NDArray[np.bool_]:
         """(n,), whether each member reached its end time."""
         return np.asarray(self.codes == FINISHED)
+
+    @property
+    def ended(self) -> dict[str, int]:
+        """How many members finished, stopped or were refused."""
+        return {word: int((self.codes == code).sum()) for code, word in enumerate(WORDS)}
 
     @property
     def status(self) -> list[str]:

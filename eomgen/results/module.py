@@ -5,12 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from eomgen.base.displays import Displayed
 from eomgen.base.files import check_writable, write_whole
+from eomgen.base.frozen import Frozen
 from eomgen.program.passes import PassReport
 
 
-@dataclass(frozen=True)
-class Module:
+@dataclass(frozen=True, repr=False)
+class Module(Frozen, Displayed):
     """A generated module.
 
     name         name of the scene
@@ -26,6 +28,13 @@ class Module:
     digits       how many of 16 digits of accelerations are right at the worst of some states; None
                  if at least ten
     """
+
+    shown = (
+        "backend",
+        "explanation",
+        "notices",
+        "digits",
+    )
 
     name: str
     source: str

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from eomgen.base.displays import Displayed
+from eomgen.base.frozen import Frozen
 from eomgen.model.model import Model
 from eomgen.results.module import Module
 from eomgen.run.problem import FloatArray
@@ -10,8 +12,8 @@ from eomgen.run.trajectory import Outcome, Trajectory
 from eomgen.scene.schema import Simulation
 
 
-@dataclass(frozen=True, eq=False)
-class Simulated:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulated(Frozen, Displayed):
     """What was simulated; see `Run`, which adds how it was chosen and what it looks like."""
 
     model: Model
@@ -20,6 +22,11 @@ class Simulated:
     simulation: Simulation = field(default_factory=Simulation)
     inputs: Mapping[str, float] = field(default_factory=dict)
     varying: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.model.name
 
     @property
     def t(self) -> FloatArray:

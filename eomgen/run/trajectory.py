@@ -10,8 +10,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.base.files import is_ours, read_plain, write_whole
+from eomgen.base.frozen import Frozen
 from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.problem import FloatArray
@@ -78,8 +80,8 @@ class Saved:
     columns: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Frozen, Displayed):
     """The states of a mechanism at n times; arrays are read-only copies, in SI units.
 
     name, states  name and states of the problem
@@ -106,6 +108,16 @@ class Trajectory:
 
     Raises `ValueError` if the values are inconsistent.
     """
+
+    shown = (
+        "integrator",
+        "states",
+        "t",
+        "y",
+        "finished",
+        "message",
+        "counts",
+    )
 
     name: str
     states: tuple[str, ...]
@@ -141,7 +153,6 @@ class Trajectory:
             raise ValueError("trajectory: t decreases")
         if self.counts.keys() != set(COUNTS):
             raise ValueError(f"trajectory: counts are {sorted(self.counts)}, not {COUNTS}")
-        arrays = [t, y]
         if self.works is not None:
             works = np.array(self.works, dtype=np.float64)
             if works.shape != (t.size, len(self.work_names)):
@@ -149,13 +160,11 @@ class Trajectory:
                     f"trajectory: works have shape {works.shape}, "
                     f"not {(t.size, len(self.work_names))}"
                 )
-            arrays.append(works)
             object.__setattr__(self, "works", works)
-        for array in arrays:
-            array.flags.writeable = False
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "y", y)
         object.__setattr__(self, "counts", {key: int(self.counts[key]) for key in COUNTS})
+        super().__post_init__()
 
     @property
     def struck(self) -> NDArray[np.int64]:

@@ -242,8 +242,22 @@ def _all(value: Any) -> Any:
     return "all" if value == ["all"] else value
 
 
-class Scene(Table, Displayed):
+class Scene(Displayed, Table):
     """A whole scene."""
+
+    shown: ClassVar[tuple[str, ...]] = (
+        "title",
+        "dimensions",
+        "parameters",
+        "inputs",
+        "bodies",
+        "joints",
+        "chains",
+        "points",
+        "effects",
+        "constraints",
+        "remarks",
+    )
 
     name: ModuleName
     title: Text = Field(default="", description="one line of text")

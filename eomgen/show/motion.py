@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError
+from eomgen.base.frozen import Frozen
 from eomgen.scene.look import BARE, Shape, numbers
 from eomgen.show.framing import Framing, View
 from eomgen.show.of_run import world_points
@@ -39,7 +40,7 @@ class Plane:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Frozen):
     """A run of a mechanism: n samples, ny states, nb bodies, nj joints that hold a common point.
 
     positions     indices of the states that are coordinates
@@ -84,6 +85,7 @@ class Motion:
     drawn: Picture | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
         assert self.t.shape == self.kinetic_energy.shape == self.potential_energy.shape == (n,)
         assert self.y.shape == (n, ny) and len(self.units) == ny

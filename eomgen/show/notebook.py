@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.show.motion import Motion
@@ -22,8 +23,8 @@ FEW = 30
 TABLE, CELL = "border-collapse:collapse;margin:.4em 0", "text-align:left;padding:.15em .9em .15em 0"
 
 
-@dataclass(frozen=True)
-class Cell:
+@dataclass(frozen=True, repr=False)
+class Cell(Displayed):
     """What a cell shows.
 
     html  text of the cell, which holds its pictures and scripts
@@ -102,7 +103,9 @@ def model_html(model: Model) -> str:
     ]
     effects = [(effect.name, effect.type) for effect in model.effects]
     named = ("body", "mass", "joint", "", "coordinates")
-    tables = _table(bodies, named) + _table(effects, ("effect", "type"))
+    held = [(each.name, len(each.row_names(model.dimensions))) for each in model.constraints]
+    tables = _table(bodies, named) + _table(held, ("constraint", "equations"))
+    tables += _table(effects, ("effect", "type"))
     return f"<p>{counts}</p>{tables}{_sketch(model)}"
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.scene.importers.conventions import Convention
 from eomgen.scene.importers.conversion import Conversion, conversion
@@ -27,8 +28,8 @@ class Wishes:
     allowed: tuple[Path, ...] = ()
 
 
-@dataclass(frozen=True)
-class Imported:
+@dataclass(frozen=True, repr=False)
+class Imported(Displayed):
     """A robot file as a scene.
 
     tables      what the scene's TOML would hold: texts, numbers, lists, tables
@@ -36,6 +37,8 @@ class Imported:
                 changed
     convention  the order and frames of coordinates and velocities in MuJoCo or Pinocchio
     """
+
+    shown = ("tables", "remarks")
 
     tables: Mapping[str, Any]
     remarks: tuple[str, ...]

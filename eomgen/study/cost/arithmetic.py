@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.model import Model
@@ -98,11 +99,18 @@ class Solver:
     words: str = ""
 
 
-@dataclass(frozen=True)
-class Arithmetic:
+@dataclass(frozen=True, repr=False)
+class Arithmetic(Displayed):
     """The results. `taken` is the route of the model; `agreed` is the least number of digits to
     which the two solutions in 60 digits agree.
     """
+
+    shown = (
+        "taken",
+        "agreed",
+        "samples",
+        "solvers",
+    )
 
     name: str
     taken: str

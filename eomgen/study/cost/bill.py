@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
+from eomgen.base.displays import Displayed
+from eomgen.base.frozen import Frozen
 from eomgen.codegen.choice import routes_of, why_not_compared
 from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.singularity import check_nonsingular
@@ -61,8 +63,8 @@ class RouteCost:
     words: str
 
 
-@dataclass(frozen=True)
-class Bill:
+@dataclass(frozen=True, repr=False)
+class Bill(Frozen, Displayed):
     """The cost of the whole scene and of its parts; `bare` is the mechanism without any effect.
 
     `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
@@ -71,6 +73,15 @@ class Bill:
     for rigid contacts, by name; they are not part of `derivative`. `stopped` says that an interrupt
     ended the motions, of which there is then none, or is "".
     """
+
+    shown = (
+        "route",
+        "operations",
+        "items",
+        "routes",
+        "extent",
+        "stopped",
+    )
 
     name: str
     route: str

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.base.files import write_whole
+from eomgen.base.frozen import Frozen
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.tangents import tangents
@@ -25,8 +27,8 @@ _UNIT = 1e-9
 """Greatest difference of a quaternion's length from 1."""
 
 
-@dataclass(frozen=True, eq=False)
-class Linearisation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Linearisation(Frozen, Displayed):
     """δẏ = A δy + B δu for small deviations from the motion through `y` under `u`.
 
     A (n, n), B (n, nu)  derivatives of the rates with respect to states and inputs
@@ -38,6 +40,15 @@ class Linearisation:
     manifold             of the deviations, three for a quaternion, that keep the constraints; None
                          without constraints
     """
+
+    shown = (
+        "state_names",
+        "input_names",
+        "y",
+        "u",
+        "A",
+        "B",
+    )
 
     A: FloatArray
     B: FloatArray

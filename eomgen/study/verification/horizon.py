@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
@@ -23,8 +24,8 @@ PARTED = 0.01
 METHOD = "DOP853"
 
 
-@dataclass(frozen=True)
-class Horizon:
+@dataclass(frozen=True, repr=False)
+class Horizon(Displayed):
     """The first time at which a run in doubles differs from one in extended precision.
 
     time   s; None if it agrees to the end
@@ -33,6 +34,11 @@ class Horizon:
     sure   the error bound of the run in extended precision, relative to the scale
     origin how that run was made
     """
+
+    shown = (
+        "words",
+        "origin",
+    )
 
     time: float | None
     t_end: float

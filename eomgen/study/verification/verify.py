@@ -9,7 +9,9 @@ from functools import partial
 
 import numpy as np
 
+from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
+from eomgen.base.frozen import Frozen
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -61,8 +63,8 @@ STATES, FEW_STATES = 8, 2
 """Default number of states of each kind; the smaller one for large models."""
 
 
-@dataclass(frozen=True)
-class Verified:
+@dataclass(frozen=True, repr=False)
+class Verified(Frozen, Displayed):
     """The results of the verification of a module.
 
     left_out  number of states without a finite acceleration in 60 digits
@@ -71,6 +73,17 @@ class Verified:
     data      change of v̇ there by one ulp in the data, ulps
     stopped   how far an interrupt let it come; "" if it is complete
     """
+
+    shown = (
+        "taken",
+        "judged",
+        "better",
+        "missed",
+        "checks",
+        "left_out",
+        "stopped",
+        "notes",
+    )
 
     name: str
     taken: str
