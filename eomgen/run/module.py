@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from types import CodeType
 from typing import Any, Protocol, cast
@@ -217,7 +218,8 @@ def _depends_on_time(module: Any) -> bool:
 def over_intervals(
     module: Any, kernel: Any, parameters: Any, inputs: Callable[[Interval], Sequence[Any]]
 ) -> Callable[[Interval], Sequence[Interval]]:
-    """A kernel that depends on time and inputs alone, as a function of intervals of time.
+    """A kernel that depends on time and inputs alone, as a function of intervals of time. At a
+    single time it has the values that the derivative has there, where these can be evaluated.
 
     inputs  gives the inputs in an interval of time, as intervals or numbers
     """
@@ -227,7 +229,12 @@ def over_intervals(
     constants = (module._DEFAULT if parameters is None else module._parameters(parameters))[name]
 
     def values(t: Interval) -> Sequence[Interval]:
-        return cast(Sequence[Interval], kernel((), constants, inputs(t), t=t, **functions))
+        u = inputs(t)
+        if t.low == t.high:
+            with suppress(ArithmeticError, ValueError):
+                now = [(x.low + x.high) / 2 if isinstance(x, Interval) else x for x in u]
+                return [Interval(x, x) for x in kernel((), constants, now, t=t.low)]
+        return cast(Sequence[Interval], kernel((), constants, u, t=t, **functions))
 
     return values
 

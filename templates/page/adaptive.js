@@ -12,7 +12,6 @@ const adaptive = (() => {
   const [RTOL, ATOL] = [1e-9, 1e-12];
   const MOST = 100000; // steps within one of the page's
   const MOST_AHEAD = 100; // steps of the page that one is long at most where forces jump at given times
-  const ROOM = 32; // for zeros in a step
   const SLOPES = 16; // of DOP853
   const numbers = (n) => new Float64Array(n);
   const areFinite = (x) => x.every(Number.isFinite);
@@ -108,8 +107,8 @@ const adaptive = (() => {
     const first = (t, y) => {
       const many = of.switching ? of.switching(t, y).length : 0;
       const watched = { many, timed: 1, turning: of.angles.length, angles: of.angles, most: steps.MOST_PARTS };
-      watch = steps.records.Watch({ ...watched, room: ROOM, earlier: NaN, here: NaN });
-      found = steps.records.Switches({ last: -Infinity, unseen: of.unseen, room: ROOM });
+      watch = steps.records.Watch({ ...watched, room: steps.MOST_PARTS * many, earlier: NaN, here: NaN });
+      found = steps.records.Switches({ last: -Infinity, unseen: of.unseen, room: steps.MOST_PARTS * many });
       run.until = Infinity;
       method = (maker === taylor && !of.series ? dormandPrince : maker)(free, system, run);
       return { t, end: t, last: y.slice(), ...method.first(t, y) };

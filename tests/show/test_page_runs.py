@@ -87,9 +87,9 @@ initial = { q = { q = 0.3 }, v = { q_dot = 1.0 } }
 type = "motor"
 name = "push"
 joint = "axle"
-torque = "-2*q + 3*step(1.1 - t) + 2*step(t - 2.3)"
+torque = "-2*q + 3*step(1.1 - t) + 2*step(t - 2.3) + step(sin(3*t) - 0.4)"
 """
-"""A disc on a spring that is pushed up to a time, and from another one on."""
+"""A disc on a spring that is pushed up to a time, from another one on, and again and again."""
 RUN = """
 const rows = [];
 const engine = makeEngine(mechanism, given.data);
