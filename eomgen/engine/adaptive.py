@@ -26,9 +26,9 @@ from eomgen.subset.words import (
     zeros,
 )
 
-MADE, AT_END, UNUSUAL, EVENT = 0, 1, 2, 3
+MADE, AT_END, UNUSUAL, EVENT, AGAIN = 0, 1, 2, 3, 4
 """Why steps ended: all were made; the next one reaches the end; it is not for these steps; the last
-one ends where rigid contacts close or open."""
+one ends where rigid contacts close or open; the next one must end earlier, which is the end now."""
 
 
 @dataclass(slots=True)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from eomgen.engine.adaptive import AT_END, EVENT, MADE, UNUSUAL, Bounds, Progress
-from eomgen.subset.words import Matrix, Vector, Whole, copy, next_after, ordered, zeros
+from eomgen.engine.adaptive import AGAIN, AT_END, EVENT, MADE, UNUSUAL, Bounds, Progress
+from eomgen.subset.words import Matrix, Vector, Whole, copy, inf, next_after, ordered, zeros
 
 
 @dataclass(slots=True)
@@ -110,7 +110,7 @@ class Checks(Protocol):
     ) -> int:
         """MADE if a step from y to `last` passes over nothing. `raw` is `last` before projection.
         EVENT if a rigid contact closes or opens in it: then `at.end` and `last` become those of the
-        event. Else why it is not to be made.
+        event. AGAIN if it must end earlier, at `run.until`. Else why it is not to be made.
         """
         ...
 
@@ -159,6 +159,34 @@ def adaptive_steps(
             by.ready(run, at, y)
             kept.lengths[kept.made - 1] = at.length
     return MADE
+
+
+def step_on(
+    by: Stepping,
+    checks: Checks,
+    run: Bounds,
+    at: Progress,
+    start: Start,
+    kept: Records,
+    until: float,
+) -> int:
+    """A step from `at.t` on, not beyond `until`, or where the last one had to end that was made
+    again. It is made again up to where `checks` say, until it passes over nothing. Then what is
+    kept of it is the start of the next one. Returns why it ended.
+    """
+    if at.t >= run.until:
+        run.until = inf
+    run.until = min(run.until, until)
+    length = at.length
+    why = AGAIN
+    while why == AGAIN:
+        at.length = length
+        kept.made = 0
+        why = adaptive_steps(by, checks, run, at, start, kept)
+    if kept.made == 1:
+        start.state[:] = kept.states[0]
+        start.lost[:] = kept.losses[0]
+    return why
 
 
 def has_rows(

@@ -48,19 +48,24 @@ CONTACT_STEPS: Roots = [("through", {})]
 ON_PAGES: tuple[Root, ...] = (
     *EQUAL.values(),
     *(("projected_change", known) for name, known in EQUAL.values() if name == "implicit_change"),
-    *[(name, {}) for name in "rattle rodas_step rodas_within expanded reach series_step".split()],
+    *[(name, {}) for name in "rattle rosenbrock_step rodas_within step_on".split()],
+    *[(name, {}) for name in "expanded reach series_step change_after order_of".split()],
     *[(name, {}) for name in "constant_rates coupled varying moved_force differences".split()],
     *[(name, {}) for name in "add_compensated normalised moved_onto convolved".split()],
     *[(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")],
-    *[
-        (name, {})
-        for name in "first_length within change_after order_of passed_over end_at".split()
-    ],
+    *[(name, {}) for name in "first_length within passed_over end_at".split()],
     *[(name, {}) for name in "begin deepest press met ended release".split()],
 )
 """What a page that goes on live calls."""
 RECORDS: tuple[type, ...] = (
-    *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contacts.Place),
+    *(
+        adaptive.Bounds,
+        adaptive.Progress,
+        adaptive_steps.Records,
+        adaptive_steps.Start,
+        contacts.Touching,
+        contacts.Place,
+    ),
     *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
     *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Terms),
     projection.Residuals,
@@ -74,7 +79,8 @@ CODES = {
     "NOT_KEPT": contact_runs.NOT_KEPT,
     "MOST_EVENTS": contact_runs.MOST_EVENTS,
     "PROJECTED": projection.PROJECTED,
-    "UNUSUAL": adaptive.UNUSUAL,
+    "MADE": adaptive.MADE,
+    "AGAIN": adaptive.AGAIN,
     "MOST_PARTS": crossings.MOST_PARTS,
     "SLOPES_USED": DOP853.last + 1,
 }

@@ -14,73 +14,75 @@ const adaptive = (() => {
   const MOST_AHEAD = 100; // steps of the page that one is long at most where forces jump at given times
   const SLOPES = 16; // of DOP853
   const numbers = (n) => new Float64Array(n);
-  const areFinite = (x) => x.every(Number.isFinite);
 
-  // Methods. `first(t, y)` is what the first step needs beside its time and state; `made(now)` a step from the
-  // end of another one, or null: its `end`, length h, the state there, `raw`, and what the next one needs;
-  // `within(step, t, to)` the state at a time in it.
+  // Methods: what the engine is given of one; the length of a `first` step; `terms`, with which a step is known between its ends
+  // after `expand`, and `place`, the state at a time in a step of which these are known.
   const dormandPrince = ({ ny, steps }, system, run) => {
-    const last = steps.SLOPES_USED - 1;
+    const [k, terms, slope] = [SLOPES * ny, 7 * ny, ny].map(numbers);
     return {
+      terms,
       first(t, y) {
-        const slope = numbers(ny);
         system.derivative(t, y, slope);
         const length = steps.first_length(system, run, t, y, slope, run.longest);
-        return { slope, length: length === Infinity ? 1 : length, lost: numbers(ny) }; // 1 without states
+        return length === Infinity ? 1 : length; // 1 without states
       },
-      made({ end: t, last: y, slope, length, lost: before }) {
-        const at = steps.records.Progress({ t, length });
-        const [raw, k, terms] = [ny, SLOPES * ny, 7 * ny].map(numbers), lost = before.slice();
-        k.set(slope);
-        if (!steps.explicit_step_DOP853(system, run, at, y, lost, k, raw)) return null;
-        steps.interpolate_DOP853(system, at, y, raw, k, terms);
-        const next = k.slice(last * ny, (last + 1) * ny);
-        return areFinite(k) ? { end: at.end, at, raw, terms, slope: next, length: at.length, lost } : null;
-      },
-      within: ({ at, y, terms }, t, to) => steps.within(at, y, terms, t, to),
+      ready: () => k.set(slope),
+      make: (_, at, y, lost, raw) => steps.explicit_step_DOP853(system, run, at, y, lost, k, raw),
+      record: () => slope.set(k.subarray((steps.SLOPES_USED - 1) * ny, steps.SLOPES_USED * ny)),
+      expand: (at, y, raw) => steps.interpolate_DOP853(system, at, y, raw, k, terms),
+      place: (at, y, raw, known, t, to) => steps.within(at, y, known, t, to),
     };
   };
   const rosenbrock = (free, system, run) => {
     const { ny, steps, positions } = free;
-    const { first } = dormandPrince(free, system, run);
-    const numbersOf = { atol: run.atol, rtol: run.rtol, positions: positions.length, timed: 1 };
-    const [rodas, factors] = [steps.records.Rodas(numbersOf), steps.records.Factors({ n: ny })];
+    const terms = numbers(3 * ny);
+    const rodas = steps.records.Rodas({ atol: run.atol, rtol: run.rtol, positions: positions.length, timed: 1, dense: terms });
+    const factors = steps.records.Factors({ n: ny });
+    let before = null;
     return {
-      first: (t, y) => ({ ...first(t, y), before: 0, error: 1 }),
-      made({ end: t, last: y, length, before, error, lost }) {
-        const dense = numbers(3 * ny);
-        Object.assign(rodas, { t_bound: run.until, longest: run.longest, h_abs: length, h_last: before, error, dense });
-        rodas.lost.set(lost);
-        if (!steps.rodas_step(system, rodas, factors, t, y)) return null;
-        const { end, h_last: h } = rodas;
-        return { end, h, raw: rodas.last.slice(), dense, length: rodas.h_abs, before: h, error: rodas.error, lost: rodas.lost.slice() };
+      terms,
+      first(t, y) {
+        before = { h_last: 0, error: 1 };
+        return dormandPrince(free, system, run).first(t, y);
       },
-      within: ({ t: start, h, y, raw, dense }, t, to) => steps.rodas_within({ dense, last: raw }, y, (t - start) / h, to),
+      ready: () => Object.assign(rodas, before, { longest: run.longest }),
+      make(_, at, y, lost, raw) {
+        rodas.lost = lost;
+        return steps.rosenbrock_step(system, rodas, factors, run, at, y, raw);
+      },
+      record: () => (before = { h_last: rodas.h_last, error: rodas.error }),
+      expand() {},
+      place: (at, y, last, dense, t, to) => steps.rodas_within({ dense, last }, y, (t - at.t) / at.h, to),
     };
   };
   const taylor = (free, system, run) => {
     const { ny, steps, series } = free;
     const order = steps.order_of(RTOL);
-    const room = steps.records.Terms({});
+    const [room, terms] = [steps.records.Terms({}), numbers((order + 1) * ny)];
     const fixed = series.fixed(...free.arguments()).slice();
+    let here = NaN;
     const of = {
       started: (t, y, first, rates) => series.first(t, y, fixed, first, rates),
       extended: (k, ...given) => series.next(k, fixed, ...given),
       sums_of_products: steps.convolved,
     };
     return {
-      first: () => ({ lost: numbers(ny) }),
-      made({ end: t, last: y, lost: before }) {
-        const [raw, rows] = [ny, (order + 1) * ny].map(numbers), lost = before.slice();
-        const at = steps.records.Progress({ t });
-        steps.expanded(of, t, y, order, room, rows);
-        at.length = steps.reach(run, order, rows, y);
-        steps.series_step(order, rows, run, at, y, lost, raw);
-        const { end } = at;
-        return end > t && areFinite(raw) ? { end, raw, rows, lost } : null;
+      terms,
+      first: () => 0, // it follows from the series
+      ready(_, at, y) {
+        if (at.t === here) return; // it is known
+        here = at.t;
+        steps.expanded(of, at.t, y, order, room, terms);
+        at.length = steps.reach(run, order, terms, y);
       },
-      within({ t: start, y, rows }, t, to) {
-        steps.change_after(t - start, order, rows, to);
+      make(_, at, y, lost, raw) {
+        steps.series_step(order, terms, run, at, y, lost, raw);
+        return at.end > at.t;
+      },
+      record() {},
+      expand() {},
+      place(at, y, raw, rows, t, to) {
+        steps.change_after(t - at.t, order, rows, to);
         for (let k = 0; k < ny; k += 1) to[k] = y[k] + to[k];
       },
     };
@@ -88,20 +90,45 @@ const adaptive = (() => {
 
   const make = (maker) => (free) => {
     const { ny, steps } = free;
-    const run = steps.records.Bounds({ atol: numbers(ny).fill(ATOL), rtol: RTOL, longest: Infinity, until: Infinity });
+    const run = steps.records.Bounds({ atol: numbers(ny).fill(ATOL), rtol: RTOL, longest: Infinity, until: Infinity, reaches: 1 });
     const [place, sizes] = [numbers(ny), numbers(ny).fill(1)];
     let [path, of, given, ahead] = [[], null, [], 0];
-    let [method, watch, found, step] = [null, null, null, null];
+    let [method, watch, found, now] = [null, null, null, null];
+    const [at, start] = [steps.records.Progress({}), steps.records.Start({})];
+    const kept = steps.records.Records({ most: 1, count: 0, wide: 0 });
     const system = {
       derivative: (t, y, out) => out.set(of.f(t, y)),
       jacobian: (t, y, out) => steps.differences(system, sizes, t, y, out),
     };
     const along = {
       states_at(n, times, to) {
-        for (let i = 0; i < n; i += 1) method.within(step, times[i], to.subarray(i * ny));
+        const { y, raw } = now;
+        method.expand(at, y, raw);
+        for (let i = 0; i < n; i += 1) method.place(at, y, raw, method.terms, times[i], to.subarray(i * ny));
       },
       switching_at: (t, y, to) => to.set(of.switching(t, y)),
       slope_at: system.derivative,
+    };
+    // What the engine is given of checks of steps; those that are kept are put on the path.
+    const checks = {
+      begins() {},
+      is_usual: () => true,
+      placed: (t, y) => Boolean(of.placed(t, y)),
+      seen(_, y, raw, last) {
+        now = { y, raw };
+        found.many = 0;
+        if (!steps.passed_over(watch, found, along, run, {}, { start: at.t, end: at.end, first: y, last }, 1)) return steps.MADE;
+        run.until = found.until; // it passed over a corner
+        return steps.AGAIN;
+      },
+      keeps(i, _, last) {
+        steps.end_at(watch, at.end);
+        found.last = found.now;
+        method.expand(at, now.y, now.raw);
+        const [y, raw, terms] = [now.y, now.raw, method.terms].map((x) => x.slice());
+        path.push({ t: at.t, h: at.h, end: at.end, length: at.length, y, raw, terms, last: last.slice() });
+        return true;
+      },
     };
     // What goes on from a time and state, of which no step before is known.
     const first = (t, y) => {
@@ -111,7 +138,9 @@ const adaptive = (() => {
       found = steps.records.Switches({ last: -Infinity, unseen: of.unseen, room: steps.MOST_PARTS * many });
       run.until = Infinity;
       method = (maker === taylor && !of.series ? dormandPrince : maker)(free, system, run);
-      return { t, end: t, last: y.slice(), ...method.first(t, y) };
+      Object.assign(at, { t, length: method.first(t, y) });
+      start.state.set(y);
+      path.push({ t, end: t, length: at.length, last: y.slice() });
     };
     // The last number before the derivative changes whatever the state is, and the next one; null if it does not within a
     // length. It is looked for at the ends of the page's own steps.
@@ -131,30 +160,17 @@ const adaptive = (() => {
       return low > t ? { low, high } : null;
     };
     const go = () => {
-      const now = path.at(-1);
-      const { end: t, last: y } = now;
-      const at = jump(t, now.length ?? run.longest);
-      if (t >= run.until) run.until = Infinity;
-      if (at) run.until = Math.min(run.until, at.low);
-      for (;;) {
-        const made = method.made(now);
-        if (!made) throw new Error("the steps become too small: the motion is not smooth here");
-        step = { t, y, ...made };
-        step.last = of.placed(step.end, step.raw.slice());
-        Object.assign(found, { until: Infinity, many: 0 });
-        if (!steps.passed_over(watch, found, along, run, {}, { start: t, end: step.end, first: y, last: step.last }, 1)) break;
-        run.until = found.until; // it passed over a corner: it is repeated
-      }
-      steps.end_at(watch, step.end);
-      found.last = found.now;
-      path.push(step);
-      if (at?.low === step.end) path.push({ ...first(at.high, step.last), lost: step.lost });
+      method.ready(run, at, start.state);
+      const forced = jump(at.t, at.length);
+      const why = steps.step_on(method, checks, run, at, start, kept, forced?.low ?? Infinity);
+      if (why !== steps.MADE) throw new Error("the steps become too small: the motion is not smooth here");
+      if (forced?.low === at.t) first(forced.high, start.state);
     };
     // The state at a time of the path.
     const state = (t) => {
       const step = path.find(({ end }) => t <= end);
       if (t === step.end) return step.last;
-      method.within(step, t, place);
+      method.place(step, step.y, step.raw, step.terms, t, place);
       return of.placed(t, place);
     };
     const goesOn = (problem, t, y) => {
@@ -166,7 +182,11 @@ const adaptive = (() => {
       return state(t).every((x, k) => x === y[k]);
     };
     const change = (problem, t, y, end) => {
-      if (!goesOn(problem, t, y)) path = [first(t, y)];
+      if (!goesOn(problem, t, y)) {
+        path = [];
+        start.lost.fill(0);
+        first(t, y);
+      }
       if (problem.timed) [ahead, run.longest] = [end - t, MOST_AHEAD * (end - t)];
       for (let count = 0; !(path.at(-1).end >= end); count += 1) {
         if (count === MOST) throw new Error("the steps become too small: the motion is not smooth here");
