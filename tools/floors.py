@@ -22,6 +22,7 @@ FLOORS = (
     "scene.effects",
     "scene.constraints",
     "scene",
+    "entries",
     "model",
     "dynamics.tree",
     "dynamics.orthogonal",

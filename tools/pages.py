@@ -1,7 +1,7 @@
 """Writes the pages that are made from the program itself: `python tools/pages.py`.
 
 docs/commands.md from the command line's own help, docs/functions.md from the docstrings of the
-public functions and classes, docs/reference from the tables of scenes.
+public functions and classes, docs/reference and eomgen/entries.pyi from the tables of scenes.
 """
 
 import argparse
@@ -14,6 +14,7 @@ from typing import Any
 
 import eomgen
 from eomgen.commands.main import parsers
+from eomgen.scene.entries import stub
 from eomgen.scene.reference import reference_pages
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -123,6 +124,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "functions.md": functions_page,
     **{f"reference/{name}": partial(_of_reference, name) for name in reference_pages()},
     "reference/index.md": reference_index,
+    "../eomgen/entries.pyi": stub,
 }
 
 if __name__ == "__main__":

@@ -35,6 +35,8 @@ class Displayed:
                 lines.append(f"    {'' if i else name:<{width}}  {line}".rstrip())
         return _cut("\n".join(lines), MOST)
 
+    __str__ = __repr__
+
 
 def _lines(part: object) -> list[str]:
     """A part as text: numbers and names as they are, others by how many or what they are."""

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import eomgen
+from eomgen.entries import Body, Gravity, Revolute, Scene
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,6 +34,13 @@ def of_scenes() -> None:
     found: eomgen.Derivation = eomgen.derive(scene)
     steps: str = found.text()
     print(version, len(names), name, len(steps))
+    pin = Revolute(name="pin", parent="world", child="rod", r_child=["-l/2", 0])
+    rod = Body(name="rod", mass=2, inertia_com="m*l**2/12")
+    numbers = {"m": 2.0, "l": 1.2}
+    swing: eomgen.Scene = Scene(
+        name="swing", parameters=numbers, bodies=[rod], joints=[pin], effects=[Gravity(g=9.81)]
+    )
+    print(eomgen.check(swing).freedom)
 
 
 def of_modules(folder: Path) -> None:
