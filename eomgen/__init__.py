@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from eomgen.api.environments import environment
     from eomgen.api.exhibiting import gallery
     from eomgen.api.exporting import export
+    from eomgen.api.fitting import fit
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.importing import import_robot
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
     from eomgen.base.errors import EomgenError, RunError, SceneError
+    from eomgen.results.fitted import Fit
     from eomgen.results.module import Module
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
@@ -38,6 +40,7 @@ __all__ = [
     "Derivation",
     "Ensemble",
     "EomgenError",
+    "Fit",
     "Module",
     "Run",
     "RunError",
@@ -54,6 +57,7 @@ __all__ = [
     "ensemble",
     "environment",
     "export",
+    "fit",
     "gallery",
     "generate",
     "grid",
@@ -78,6 +82,8 @@ _PLACES = {
     "derive": "api.deriving",
     "environment": "api.environments",
     "export": "api.exporting",
+    "fit": "api.fitting",
+    "Fit": "results.fitted",
     "gallery": "api.exhibiting",
     "import_robot": "api.importing",
     "linearise": "api.linearising",

@@ -46,6 +46,7 @@ AFTER = (
         "native",
         "run",
         "study",
+        "fitting",
         "sweep",
         "show",
         "exports",

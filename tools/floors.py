@@ -46,6 +46,7 @@ FLOORS = (
     "study.verification",
     "study.cost",
     "study",
+    "fitting",
     "sweep",
     "show",
     "exports",

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from eomgen.api.given import check_name, named
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.base.errors import RunError, nearest
 from eomgen.base.files import read_plain
+from eomgen.fitting.logs import Frame
 from eomgen.language.base import identifier
 from eomgen.language.conditions import value_of
 from eomgen.language.formula import (
@@ -32,17 +33,6 @@ from eomgen.scene.schema import Scene
 
 Given = float | str | Callable[[float], float]
 """A constant, a formula, or a function of time."""
-
-
-class Frame(Protocol):
-    """A table with columns by name, such as a DataFrame of pandas."""
-
-    @property
-    def columns(self) -> Any:
-        """The names of its columns."""
-
-    def __getitem__(self, name: Any, /) -> Any:
-        """A column."""
 
 
 Inputs = Mapping[str, Given] | str | PathLike[str] | Frame

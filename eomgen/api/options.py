@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from eomgen.api.inputs import Inputs
     from eomgen.api.runs import Run
     from eomgen.exports import Number
+    from eomgen.fitting.logs import Data
     from eomgen.results.design import Design, Law
     from eomgen.run.problem import FloatArray
     from eomgen.run.tally import Follow
@@ -432,6 +433,73 @@ class PointOptions(Started, Constants):
 
 
 @dataclass(frozen=True)
+class FitOptions(Started, Constants):
+    """The options of `fit`."""
+
+    source: "Source"
+    data: "Data | Sequence[Data]" = field(
+        metadata=about(
+            "an experiment, or a list of several: the path of a table of comma-separated values, "
+            "a DataFrame, or a mapping, with a column t, states (angles in degrees as "
+            "`<name>_deg`) and outputs by name, for example `point_positions.tip.x`, and inputs, "
+            "which are linear between samples. Missing samples are nan, or empty; other columns "
+            "are left out",
+            flag=None,
+        )
+    )
+    names: str | Sequence[str] = field(
+        metadata=about(
+            "what is fitted: parameters, and states at the start of each experiment", flag=None
+        )
+    )
+    _: KW_ONLY
+    measured: Sequence[str] = option(
+        (),
+        "the measured columns that are fitted to; (): all",
+        help="the measured columns that are fitted to (all)",
+        value="A,B,…",
+        read=names_in,
+    )
+    bounds: "Mapping[str, tuple[float, float]] | None" = option(
+        None,
+        "the least and the greatest value, by name",
+        help="the least and the greatest value of what is fitted",
+        flag="--bound",
+        value="NAME=LOW:HIGH",
+        count="many",
+    )
+    priors: "Mapping[str, tuple[float, float]] | None" = option(
+        None,
+        "what is known before, by name: a mean and its standard deviation",
+        help="what is known before: a mean and its standard deviation",
+        flag="--prior",
+        value="NAME=MEAN:DEVIATION",
+        count="many",
+    )
+    noise: "Values | None" = option(
+        None,
+        "standard deviations of the noise of measured columns, by name; others are estimated from "
+        "the residuals",
+        help="standard deviation of the noise of a column (estimated from the residuals)",
+        value="NAME=X",
+        count="many",
+    )
+    inputs: "Inputs | None" = _inputs(
+        "constant values of inputs that are not in the data, by name; others have their defaults",
+        "constant value of an input that is not in the data",
+    )
+    rtol: float = option(1e-8, "relative tolerance of the motion and its sensitivities")
+    backend: Backend = option(
+        "auto",
+        '"c": compute motions in compiled code; "numpy": in Python, with the same bits; "auto": '
+        '"c" if there is a compiler',
+        help="c: compute in compiled C code; numpy: in Python; auto: c if there is a compiler",
+        value="NAME",
+        choices=BACKENDS,
+    )
+
+
+@dataclass(frozen=True)
 class SpaceOptions(PointOptions):
     """The options of `state_space`."""
 
@@ -519,6 +587,7 @@ RECORDS = (
     VerifyOptions,
     EffectsOptions,
     PointOptions,
+    FitOptions,
     ExportOptions,
 )
 """The records of which commands take options."""

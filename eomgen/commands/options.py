@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eomgen.api.options import FORMS, OWN, Forced, check_seed, check_time, outputs_in
+from eomgen.api.options import FORMS, OWN, Forced, check_seed, check_time, names_in, outputs_in
 from eomgen.base.options import option
 from eomgen.exports import FORMATS
 from eomgen.show.filming import FilmOptions
@@ -110,6 +110,25 @@ class Gallery(InFolder, Live):
         None, "files or built-in names (all built-in ones)", value="SCENE", count="+"
     )
     output: Path = option(Path("gallery"), "output folder", flag="-o --output", value="DIR")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Logs:
+    """What `fit` takes beside its options."""
+
+    data: Sequence[Path] = option(
+        (),
+        "measurements with columns t, inputs, states and outputs",
+        flag="LOG",
+        value="FILE.csv",
+        count="+",
+    )
+    names: Sequence[str] = option(
+        (),
+        "what is fitted: parameters, and states at the start of each experiment",
+        value="A,B,…",
+        read=names_in,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

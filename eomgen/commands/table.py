@@ -231,6 +231,14 @@ _ALL = (
         options=(api.PointOptions, api.Routed, own.Matrices),
         kept=DERIVED,
     ),
+    Command(
+        "fit",
+        "fitting:fit",
+        "fit parameters and initial states to measurements",
+        "eomgen fit swing.toml measured.csv --names b,theta",
+        options=(own.Logs, api.FitOptions, api.Routed),
+        kept=DERIVED,
+    ),
 )
 
 

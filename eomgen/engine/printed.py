@@ -27,6 +27,7 @@ from eomgen.engine import (
     rattle,
     roots,
     rosenbrock,
+    sampled,
     separable,
     sums,
     symmetric,
@@ -90,7 +91,7 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, adaptive_steps, equal_steps, explicit, implicit, rosenbrock, taylor)
+    steps = (adaptive, adaptive_steps, equal_steps, explicit, implicit, rosenbrock, sampled, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)

@@ -1,0 +1,1 @@
+"""Parameters and initial states from measured motions."""
