@@ -24,8 +24,14 @@ LEAST = 1e-3
 """A member of a combination that takes part in it by less than this is left out."""
 ROUNDS, SETTLED = 20, 1e-4
 """Most fits with other weights, and the change of deviations that ends them."""
-TOLERANCE = 1e-11
+TOLERANCE = 1e-9
 """Of the optimiser, relative; below the errors of the motion nothing is gained."""
+MOST = 200
+"""Most motions of a search."""
+REFUSED = (
+    "the search has ended at values beyond which the scene has no motion; begin elsewhere, or give "
+    "bounds"
+)
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -123,7 +129,7 @@ def estimated(
         before = noise
         noise = np.where(known, weighed.noise, _deviations(found, sought, noise, weighed.groups))
         alone = len(noise) == 1 and not np.isfinite(sought.sigma).any()
-        if alone or np.all(np.abs(noise - before) <= SETTLED * before):
+        if why or alone or np.all(np.abs(noise - before) <= SETTLED * before):
             break
     return _judged(calls, sought, noise, weighed.groups, values, why, bool(known.all()))
 
@@ -132,7 +138,7 @@ class _Calls:
     """Residuals by values, of which the last are kept."""
 
     def __init__(self, evaluate: Callable[[FloatArray], Residuals]) -> None:
-        self._evaluate, self.made = evaluate, 0
+        self._evaluate, self.made, self.refused = evaluate, 0, False
         self._last: tuple[bytes, Residuals] | None = None
 
     def at(self, values: FloatArray) -> Residuals:
@@ -141,6 +147,7 @@ class _Calls:
         if self._last is None or self._last[0] != key:
             self.made += 1
             self._last = key, self._evaluate(values)
+        self.refused = not np.isfinite(self._last[1].values).all()
         return self._last[1]
 
 
@@ -180,9 +187,11 @@ def _fitted(
         ftol=TOLERANCE,
         xtol=TOLERANCE,
         gtol=TOLERANCE,
-        max_nfev=200,
+        max_nfev=MOST,
     )
-    return found.x, "" if found.status > 0 else "the search has not converged after 200 motions"
+    if found.status == 0:
+        return found.x, f"the search has not converged after {MOST} motions"
+    return found.x, REFUSED if calls.refused else ""
 
 
 def _deviations(found: Residuals, sought: Sought, noise: FloatArray, groups: Any) -> FloatArray:

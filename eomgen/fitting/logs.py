@@ -49,7 +49,7 @@ class Log:
 
 def read_log(data: Data, place: str) -> Log:
     """The experiment of a path of comma-separated values, a DataFrame (or whatever has columns) or
-    a mapping. Columns of texts are left out.
+    a mapping. Columns of texts have no sample.
 
     Raises `RunError`, which begins with `place`, without times that ascend, or if columns differ in
     length. It is the path of a file.
@@ -68,14 +68,15 @@ def read_log(data: Data, place: str) -> Log:
         raise RunError(
             f"{place}: {type(data).__name__} is none; give a path, a DataFrame or a mapping with t"
         )
-    kept = {name: values for name, values in columns.items() if values is not None}
-    return _checked(kept, place)
+    return _checked(columns, place)
 
 
-def _checked(columns: dict[str, FloatArray], place: str) -> Log:
-    if "t" not in columns:
+def _checked(given: dict[str, FloatArray | None], place: str) -> Log:
+    t = given.pop("t", None)
+    if t is None:
         raise RunError(f"{place}: has no column t of times in s; name one t")
-    t = columns.pop("t")
+    none = np.full(t.shape, np.nan)
+    columns = {name: none if values is None else values for name, values in given.items()}
     for name, values in columns.items():
         if values.shape != t.shape:
             raise RunError(

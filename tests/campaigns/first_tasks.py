@@ -61,14 +61,13 @@ TASKS = (
     Task(
         "a friction coefficient fitted to a CSV file",
         ("README.md", "docs/howto/fit.md"),
-        ("python measure.py", "python fit.py"),
+        ("python measure.py", "eomgen fit shuttle.toml measured.csv --names b"),
         (
             (
                 "measure.py",
                 1,
                 (("swing", "shuttle"), ("5.0", "8.0"), ("0.035", "0.3"), ("0.01,", "0.005,")),
             ),
-            ("fit.py", 2, (("swing", "shuttle"), ("5.0", "8.0"), ("[0.01]", "[0.1]"))),
         ),
     ),
     Task(
