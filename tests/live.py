@@ -11,8 +11,8 @@ from typing import Any
 from eomgen.engine.printed import steps_of_pages
 
 PAGE = Path(__file__).parent.parent / "templates" / "page"
-SHARED = "../javascript/contacts.js"
-ENGINE = ("methods.js", "adaptive.js", SHARED, "contacts.js", "loops.js", "engine.js")
+SHARED = ("../javascript/contacts.js", "../javascript/loops.js")
+ENGINE = ("methods.js", "adaptive.js", *SHARED, "contacts.js", "loops.js", "engine.js")
 NODE = which("node")
 
 

@@ -69,7 +69,6 @@ RECORDS: tuple[type, ...] = (
     ),
     *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
     *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Terms),
-    projection.Residuals,
 )
 """What it gives them."""
 SIZES = ("STATES", "POSITIONS", "OTHERS", "CONTACTS", "PRESSED", "FIRST", "PRODUCTS", "ORDERS")

@@ -68,6 +68,9 @@ def _step(method: Method, interface: Interface, size: float, contacts: Mapping[s
     context: dict[str, Any] = {
         **sizes_of(method, interface, size),
         "states": len(interface.states),
+        "velocities": interface.velocities,
+        "projection": ["constraint_residuals", "project_position", "project_velocity"],
+        "linkage": [name for _, name in method.linkage],
         **contacts,
         "engine": JAVASCRIPT.prelude + printed(text(), roots, JAVASCRIPT),
         "method": {**values, "call": _of_c(values["call"])},
