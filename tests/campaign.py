@@ -1,7 +1,8 @@
 """How much is tried: the ordinary run takes a part, `FULL=1 python -m pytest` takes everything."""
 
 import os
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -29,3 +30,31 @@ def thinned(cases: Iterable[T], every: int) -> list[T]:
 def some(part: T, whole: T) -> T:
     """The part, or the whole in a full run."""
     return whole if FULL else part
+
+
+class Failure(AssertionError):
+    """What came of a case that must not come of any."""
+
+
+def counted(
+    outcome: Callable[[int], str], numbers: Iterable[int]
+) -> tuple[Counter[str], list[str]]:
+    """How often what came of cases that are made by number, and what failed, each with its number.
+
+    `outcome` says in a word what came of a case, or raises `Failure`.
+    """
+    counts: Counter[str] = Counter()
+    failures: list[str] = []
+    for number in numbers:
+        try:
+            counts[outcome(number)] += 1
+        except Failure as failure:
+            failures.append(f"{number}: {failure}")
+    return counts, failures
+
+
+def among(words: str, well: tuple[str, ...]) -> str:
+    """What came of a case, if it is one of these."""
+    if words not in well:
+        raise Failure(words)
+    return words

@@ -13,13 +13,14 @@ import shutil
 import signal
 import traceback
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
+
+from campaign import Failure
 
 import eomgen.commands.main
 import eomgen.run.module
@@ -151,43 +152,41 @@ def kept(place: Path) -> bytes:
     return (place / f"{NAME}.csv").read_bytes()
 
 
-def tried(numbers: Iterable[int], place: Path) -> tuple[Counter[str], list[str]]:
-    """Attack the folder of a sweep again and again. Returns how often each attack was mended or
-    refused, and what failed.
+def outcome(place: Path, number: int) -> str:
+    """Attack the folder of a sweep, in a folder for all attacks: the first of them and what came of
+    it, 'mended' or 'refused'. Raises `Failure` for anything else.
     """
-    table = kept(place / "whole")
-    counts, failures = Counter[str](), []
-    for number in numbers:
-        r = random.Random(number)
-        out = place / "attacked"
-        shutil.rmtree(out, ignore_errors=True)
-        shutil.copytree(place / "whole", out)
-        (out / f"{NAME}.csv").unlink()
-        (out / "notes.txt").write_bytes(NOTES)
-        attacks = []
-        for _ in range(r.choice((1, 1, 1, 2))):
-            folder = out / NAME
-            files = [] if folder.is_symlink() else sorted(p for p in folder.glob("*"))
-            files = [p for p in files if p.is_file() and p.stat().st_size]
-            if all(not p.is_symlink() and p.stat().st_nlink == 1 for p in files) and files:
-                attack = r.choice(ATTACKS)
-                attack(r.choice(files), r)
-                attacks.append(attack.__name__.strip("_"))
-        outside = _outside(out)
-        try:
-            code, said = _run(out)
-        except BaseException:
-            failures.append(f"{number} {attacks}: {traceback.format_exc()}")
-            continue
-        lines = said.splitlines()
-        made = out / f"{NAME}.csv"
-        refused = code == 1 and len(lines) == 1 and lines[0].startswith("eomgen: ")
-        same = code == 0 and not lines and made.read_bytes() == table and _sound(out / NAME, place)
-        plain = said.replace("\n", "").isprintable() and len(said) < 2 * LONGEST_LINE
-        if not ((refused or same) and plain and _outside(out) == outside):
-            failures.append(f"{number} {attacks}: {code} {said!r}")
-        counts[f"{attacks[0]} {'refused' if refused else 'mended'}"] += 1
-    return counts, failures
+    if not (place / "whole").exists():
+        kept(place / "whole")
+    table = (place / "whole" / f"{NAME}.csv").read_bytes()
+    r = random.Random(number)
+    out = place / "attacked"
+    shutil.rmtree(out, ignore_errors=True)
+    shutil.copytree(place / "whole", out)
+    (out / f"{NAME}.csv").unlink()
+    (out / "notes.txt").write_bytes(NOTES)
+    attacks = []
+    for _ in range(r.choice((1, 1, 1, 2))):
+        folder = out / NAME
+        files = [] if folder.is_symlink() else sorted(p for p in folder.glob("*"))
+        files = [p for p in files if p.is_file() and p.stat().st_size]
+        if all(not p.is_symlink() and p.stat().st_nlink == 1 for p in files) and files:
+            attack = r.choice(ATTACKS)
+            attack(r.choice(files), r)
+            attacks.append(attack.__name__.strip("_"))
+    outside = _outside(out)
+    try:
+        code, said = _run(out)
+    except BaseException:
+        raise Failure(f"{attacks}: {traceback.format_exc()}") from None
+    lines = said.splitlines()
+    made = out / f"{NAME}.csv"
+    refused = code == 1 and len(lines) == 1 and lines[0].startswith("eomgen: ")
+    same = code == 0 and not lines and made.read_bytes() == table and _sound(out / NAME, place)
+    plain = said.replace("\n", "").isprintable() and len(said) < 2 * LONGEST_LINE
+    if not ((refused or same) and plain and _outside(out) == outside):
+        raise Failure(f"{attacks}: {code} {said!r}")
+    return f"{attacks[0]} {'refused' if refused else 'mended'}"
 
 
 def _sound(folder: Path, place: Path) -> bool:

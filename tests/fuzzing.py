@@ -8,12 +8,12 @@ import random
 import re
 import signal
 import sys
-import time
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
+
+from campaign import Failure
 
 from eomgen.base.errors import SceneError
 from eomgen.base.text import LONGEST_LINE
@@ -51,10 +51,6 @@ KEYS = (
 )
 FORBIDDEN = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect", "exec")
 """What a scene may not bring about, by the names of Python's audit events; nor files opened."""
-
-
-class Failure(AssertionError):
-    """What came of a scene that was neither a message nor a model."""
 
 
 @cache
@@ -140,26 +136,42 @@ def _heard(event: str, given: Any) -> None:
 
 
 @contextmanager
-def _watched() -> Iterator[list[str]]:
-    """What happens meanwhile that should not; a signal ends it when it hangs."""
-    global _events
+def no_hang() -> Iterator[None]:
+    """Raises `Failure` in what takes too much of the processor."""
 
     def hangs(*given: Any) -> None:
         raise Failure(f"hangs for {HANGS:g} s")
 
     before = signal.signal(signal.SIGPROF, hangs)
     signal.setitimer(signal.ITIMER_PROF, HANGS)
-    _events = heard = []
     try:
-        yield heard
+        yield
     finally:
-        _events = None
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
 
 
-def outcome(text: str) -> str:
-    """'message' or 'model'. Raises `Failure` for anything else."""
+@contextmanager
+def _watched() -> Iterator[list[str]]:
+    """What happens meanwhile that should not."""
+    global _events
+    _events = heard = []
+    try:
+        with no_hang():
+            yield heard
+    finally:
+        _events = None
+
+
+def outcome(number: int) -> str:
+    """What comes of the scene of a number: 'message' or 'model'. Raises `Failure` for anything
+    else.
+    """
+    _listening()
+    return _outcome(scene(number))
+
+
+def _outcome(text: str) -> str:
     try:
         with _watched() as events:
             try:
@@ -193,23 +205,5 @@ def _listening() -> None:
     for text in texts():
         elaborate(parse_scene(text))
     for value in VALUES:
-        outcome(f'name = "x"\nbodies = [{{name = "a", mass = {value}, inertia_com = 1}}]')
+        _outcome(f'name = "x"\nbodies = [{{name = "a", mass = {value}, inertia_com = 1}}]')
     sys.addaudithook(_heard)
-
-
-def tried(numbers: range) -> tuple[Counter[str], float, list[str]]:
-    """How often what came of scenes, the longest time that one took, s, and what failed, each with
-    the scene's number.
-    """
-    _listening()
-    counts: Counter[str] = Counter()
-    failures: list[str] = []
-    longest = 0.0
-    for number in numbers:
-        began = time.process_time()
-        try:
-            counts[outcome(scene(number))] += 1
-        except Failure as failure:
-            failures.append(f"scene {number}: {failure}")
-        longest = max(longest, time.process_time() - began)
-    return counts, longest, failures

@@ -9,13 +9,11 @@ import io
 import json
 import random
 import re
-import signal
 import tempfile
 import tomllib
 import traceback
 import warnings
 import zipfile
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from functools import cache
@@ -24,7 +22,8 @@ from typing import Any
 
 import fuzzing
 import numpy as np
-from fuzzing import HANGS, Failure
+from campaign import Failure
+from fuzzing import no_hang
 
 from eomgen.base.errors import EomgenError, RunError
 from eomgen.base.text import LONGEST_LINE
@@ -210,7 +209,7 @@ def _base() -> bytes:
         return (Path(folder) / "pendulum.npz").read_bytes()
 
 
-def outcome(kind: str, number: int, folder: Path) -> str:
+def outcome(kind: str, folder: Path, number: int) -> str:
     """'refused' or 'taken'. Raises `Failure` for anything else."""
     path = folder / f"hostile.{'toml' if kind == SCENES else 'npz'}"
     path.write_bytes(scene_file(number) if kind == SCENES else archive_file(number, _base()))
@@ -247,14 +246,8 @@ def _loaded(path: Path) -> int:
 @contextmanager
 def _watched() -> Iterator[None]:
     """Raises `Failure` for what is no message, a warning too, and for what hangs."""
-
-    def hangs(*given: Any) -> None:
-        raise Failure(f"hangs for {HANGS:g} s")
-
-    before = signal.signal(signal.SIGPROF, hangs)
-    signal.setitimer(signal.ITIMER_PROF, HANGS)
     try:
-        with warnings.catch_warnings(record=True, action="always") as warned:
+        with no_hang(), warnings.catch_warnings(record=True, action="always") as warned:
             yield
         if warned:
             raise Failure(f"warns: {warned[0].message}")
@@ -264,9 +257,6 @@ def _watched() -> Iterator[None]:
         where = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__} at {where.filename}:{where.lineno}: {error}"
         raise Failure(text[:300]) from error
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def _reported(command: list[str]) -> tuple[int, str]:
@@ -289,15 +279,3 @@ def _reported(command: list[str]) -> tuple[int, str]:
     if bool(code) != bool(faults) or len(faults) > 12:
         raise Failure(f"exit code {code} with {len(faults)} messages")
     return code, said
-
-
-def tried(kind: str, numbers: range, folder: Path) -> tuple[Counter[str], list[str]]:
-    """How often what came of files, and what failed, each with the file's number."""
-    counts: Counter[str] = Counter()
-    failures: list[str] = []
-    for number in numbers:
-        try:
-            counts[outcome(kind, number, folder)] += 1
-        except Failure as failure:
-            failures.append(f"{kind} {number}: {failure}")
-    return counts, failures

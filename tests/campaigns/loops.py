@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parent.parent))
+sys.path += [str(Path(__file__).parent.parent / room) for room in ("", "run", "dynamics")]
 
 import judges
 import planar_linkages

@@ -1,7 +1,7 @@
 """A hundred faults all over the program, and which test catches each.
 
     python tests/campaigns/seeded_faults.py [--list] [--first N] [--last N] [--log FILE]
-        [--near | --before REV] [--count N] [--seed N]
+        [--near | --before REV] [--count N] [--seed N] [--only WORD]
 
 A fault is one change in one place: a sign, a dropped term, < for <=, a condition turned round, a
 constant or an index that is off by one, sin for cos. The packages and the folders of templates get
@@ -10,10 +10,11 @@ as many as they have lines. Each is made in a copy of the project. There run the
 more than LONGEST processor time counts as caught, too. What is not caught is shown with its line:
 the tests have a hole there, or the change means nothing.
 
-`--near`: only the tests of the changed package run; what they miss is left for another call.
-`--before`: where the tests as they stand catch nothing, the cases run that this revision's tests
-have and they have not. A log has a line of JSON for each fault; faults that have theirs are not
-tried again, so a campaign can be stopped and continued.
+`--only`: faults in files that have this in their path, such as `eomgen/d` for the derivation and
+what it derives from. `--near`: only the tests of the changed package run; what they miss is left
+for another call. `--before`: where the tests as they stand catch nothing, the cases run that this
+revision's tests have and they have not. A log has a line of JSON for each fault; faults that have
+theirs are not tried again, so a campaign can be stopped and continued.
 """
 
 import argparse
@@ -211,15 +212,15 @@ def faults_of_template(path: Path) -> Iterator[Fault]:
 # Which of them.
 
 
-def chosen(count: int, seed: int) -> list[Fault]:
-    """Faults at random, of each package and folder of templates by the number of its lines; in an
-    order that mixes the packages.
+def chosen(count: int, seed: int, only: str = "") -> list[Fault]:
+    """Faults at random, of each package and folder of templates by the number of its lines, of
+    files with a word in their path; in an order that mixes the packages.
     """
     rooms: dict[str, list[Path]] = {}
     for pattern in ("eomgen/**/*.py", "templates/**/*.j*"):
         for path in sorted(ROOT.glob(pattern)):
             parts = path.relative_to(ROOT).parts
-            if "vendor" not in parts:
+            if "vendor" not in parts and only in "/".join(parts):
                 rooms.setdefault("/".join(parts[:2]) if parts[2:] else parts[0], []).append(path)
     every = {room: [f for path in paths for f in faults_of(path)] for room, paths in rooms.items()}
     lines = {r: sum(len(p.read_text("utf-8").splitlines()) for p in ps) for r, ps in rooms.items()}
@@ -404,8 +405,9 @@ def main() -> int:
     parser.add_argument("--before", default="", metavar="REV")
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", metavar="WORD")
     given = parser.parse_args()
-    faults = chosen(given.count, given.seed)
+    faults = chosen(given.count, given.seed, given.only)
     if given.list:
         for k, fault in enumerate(faults):
             print(f"{k}: {fault.told()}")

@@ -81,7 +81,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
 
 
 def test_right_or_refused() -> None:
-    """Some of the cases that `campaigns.alignment` tries twenty thousand of."""
+    """Some of the cases that `campaigns/by_number.py` tries twenty thousand of."""
     for number in range(some(8, 2000)):
         outcome = tried(case(number), closed=number % 10 == 0)
         assert outcome in WELL, (number, outcome)

@@ -69,7 +69,7 @@ def case(number: int) -> tuple[int, int, list[float], bool]:
     special=st.booleans(),
 )
 def test_right_or_refused(seed: int, dimensions: int, decades: list[float], special: bool) -> None:
-    """No error beyond its bound goes unsaid. `campaigns.silent_errors` tries 1e5 cases."""
+    """No error beyond its bound goes unsaid. `campaigns/by_number.py` tries 1e5 cases."""
     outcome = tried(seed, dimensions, decades, special)
 
     assert outcome in WELL, outcome

@@ -6,8 +6,8 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
-from campaign import some
-from folder_attacks import tried
+from campaign import counted, some
+from folder_attacks import outcome
 
 import eomgen
 from eomgen.base.errors import RunError
@@ -17,7 +17,7 @@ from eomgen.sweep.members import Task
 
 def test_attacked_folders(tmp_path: Path) -> None:
     """Flips, cuts, links, pipes, edits, left-overs: the first of a campaign."""
-    counts, failures = tried(range(some(30, 1000)), tmp_path)
+    counts, failures = counted(partial(outcome, tmp_path), range(some(30, 1000)))
     assert not failures, "\n".join(failures)
     assert len(counts) > 10
 
