@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from eomgen.codegen import jacobians
 from eomgen.codegen.system import System
@@ -24,8 +25,8 @@ from eomgen.scene.schema import Scene
 from eomgen.study.verification.states import random_state
 
 __all__ = [
-    "MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "plain", "quick", "read",
-    "text_of", "varied",
+    "MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "motion", "plain",
+    "quick", "read", "text_of", "unit_state", "varied",
 ]  # fmt: skip
 
 STEP = MP.mpf(10) ** -20
@@ -140,6 +141,25 @@ def text_of(source: Scene | Model) -> str:
     """The module that is written of a scene, or of a model as it is."""
     model = assembled(elaborate(source)) if isinstance(source, Scene) else source
     return generate(model).module
+
+
+def unit_state(module: Any, seed: int) -> np.ndarray:
+    """A state of a module, normally distributed, with quaternions of length 1."""
+    y = np.random.default_rng(seed).normal(size=len(module.STATES))
+    for indices in map(list, module.QUATERNIONS):
+        y[indices] /= np.linalg.norm(y[indices])
+    return y
+
+
+def motion(
+    made: Engine, times: np.ndarray, start: Any = None, rtol: float = 1e-12, atol: float = 1e-13
+) -> np.ndarray:
+    """The states at some times, (ny, n), from the initial one at 0 or another, by SciPy."""
+    start = made.module.initial_state() if start is None else start
+    f, span = made.module.derivative, (0.0, times[-1])
+    found = solve_ivp(f, span, start, "DOP853", times, rtol=rtol, atol=atol)
+    assert found.success
+    return found.y
 
 
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:

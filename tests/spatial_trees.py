@@ -148,6 +148,12 @@ class SpatialTree:
         """Where a module's STATES hold q and then v: `y[places]` is q, v."""
         return [states.index(name) for name in (*self.coordinates, *self.velocities)]
 
+    def state(self, states: Sequence[str], q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """A state, or the rates of one, in the order of a module's STATES."""
+        y = np.empty(len(states))
+        y[self.places(states)] = np.concatenate((q, v))
+        return y
+
     def rows(self, names: Sequence[str]) -> list[int]:
         """The row in the judges' results of each of a module's BODIES, or of its JOINTS."""
         bodies = [body.name for body in self.bodies]

@@ -4,21 +4,18 @@ Gravity acts along -y in the plane. "Exactly" is in 60 digits, with the derivati
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
 import pytest
 from campaign import some
 from engine import MP, Engine, along, apart, engine
+from scenes import WEIGHT, effect, free, lone, refusal
 from scipy.integrate import solve_ivp
-from spatial_newton_euler import carried, solve, under
-from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
+from spatial_trees import PLANE, SPACE
 
-from eomgen.base.errors import SceneError
-from eomgen.model.elaborate import elaborate
 from eomgen.scene.effects.vectors import NEAREST
-from eomgen.scene.reader import parse_scene
 from eomgen.tables.outputs import OUTPUTS
 
 EXACT = 1e-12
@@ -29,89 +26,23 @@ M = 2.0
 
 # Scenes.
 
-SLIDER = """
-name = "slider"
-dimensions = 2
-[[bodies]]
-name = "b"
-mass = 2.0
-inertia_com = 0.1
-[[joints]]
-name = "j"
-type = "prismatic"
-axis = [1, 0]
-parent = "world"
-child = "b"
-coordinate = "x"
-"""
-PENDULUM = """
-name = "swing"
-dimensions = 2
-[[bodies]]
-name = "b"
-mass = 2.0
-inertia_com = 0.3
-[[joints]]
-name = "j"
-type = "revolute"
-parent = "world"
-child = "b"
-r_child = [-0.8, 0]
-coordinate = "q"
-[[effects]]
-type = "gravity"
-g = 9.81
-"""
-BOB = """
-name = "bob"
-dimensions = 2
-[[bodies]]
-name = "b"
-mass = 2.0
-inertia_com = 0.3
-[[joints]]
-name = "j"
-type = "free"
-child = "b"
-[[effects]]
-type = "gravity"
-g = 9.81
-"""
-PAIR = """
-name = "pair"
-dimensions = {}
-[[bodies]]
-name = "a"
-mass = 2.0
-inertia_com = 0.3
-[[joints]]
-name = "ja"
-type = "free"
-child = "a"
-[[bodies]]
-name = "b"
-mass = 1.3
-inertia_com = 0.2
-[[joints]]
-name = "jb"
-type = "free"
-child = "b"
-"""
+SLIDER = lone("prismatic", mass=M, axis=[1, 0], coordinate="x")
+PENDULUM = lone("revolute", WEIGHT, mass=M, inertia_com=0.3, r_child=[-0.8, 0], coordinate="q")
+BOB = lone("free", WEIGHT, mass=M, inertia_com=0.3)
+PAIRS = {
+    PLANE: free("a", "b", mass={"a": M, "b": 1.3}, inertia_com=0.3),
+    SPACE: free("a", "b", mass={"a": M, "b": 1.3}, inertia_com=[0.3, 0.2, 0.25], dimensions=SPACE),
+}
 
 
-def effect(kind: str, *lines: str, name: str = "e") -> str:
-    """An effect's table."""
-    return "\n".join((f'[[effects]]\ntype = "{kind}"\nname = "{name}"', *lines, ""))
-
-
-def between(first: str, second: str, *lines: str, name: str = "e") -> str:
+def between(first: str, second: str, *lines: str) -> str:
     """A spring's table."""
-    return effect("spring", f'body_1 = "{first}"', f'body_2 = "{second}"', *lines, name=name)
+    return effect("spring", *lines, body_1=first, body_2=second)
 
 
-def at_joint(kind: str, *lines: str, joint: str = "j", name: str = "e") -> str:
+def at_joint(kind: str, *lines: str) -> str:
     """A table of an effect at a joint."""
-    return effect(kind, f'joint = "{joint}"', *lines, name=name)
+    return effect(kind, *lines, joint="j")
 
 
 @cache
@@ -198,10 +129,10 @@ def test_a_law_stands_for_stiffness() -> None:
 def test_coulomb_friction_holds_and_slips_as_smoothed() -> None:
     """Below the threshold: creep at speed artanh(F/C); above: (F - C)/m; sliding stops in time."""
     table = at_joint("joint_friction", "coulomb = 6.0", "speed = 0.001")
-    motor = '[[effects]]\ntype = "motor"\nname = "push"\njoint = "j"\ntorque = {}\n'
-    creep = run(SLIDER + table + motor.format(5.4), [0.0, 0.0], 0.05)
+    pushed = partial(effect, "motor", name="push", joint="j")
+    creep = run(SLIDER + table + pushed(torque=5.4), [0.0, 0.0], 0.05)
     assert creep(0.05)[1] == pytest.approx(0.001 * math.atanh(0.9), rel=1e-8)
-    slip = run(SLIDER + table + motor.format(6.6), [0.0, 0.5], 1.0)
+    slip = run(SLIDER + table + pushed(torque=6.6), [0.0, 0.5], 1.0)
     assert slip(1.0)[1] == pytest.approx(0.5 + 0.6 / M, abs=1e-8)
     # m v̇ = -C tanh(v/v0): sinh(v/v0) falls as exp(-C t/(m v0)).
     stop = run(SLIDER + table, [0.0, 0.02], 0.01)
@@ -261,96 +192,13 @@ def test_a_spring_between_free_bodies_keeps_momentum(
         ends = ("at_1 = [0.2, 0.3, -0.5]", "at_2 = [-0.1, 0.4, 0.2]")
     own = () if any("law" in line for line in more) else ("stiffness = 30.0",)
     numbers = ("damping = 4.0", "rest_length = 0.3", *own, *more)
-    pair = PAIR.format(dimensions)
-    if dimensions == SPACE:
-        pair = pair.replace("inertia_com = 0.3", "inertia_com = [0.3, 0.2, 0.25]")
-        pair = pair.replace("inertia_com = 0.2\n", "inertia_com = [0.1, 0.2, 0.25]\n")
-    found = made(pair + between("a", "b", *ends, *numbers))
+    found = made(PAIRS[dimensions] + between("a", "b", *ends, *numbers))
     rng = np.random.default_rng(3)
     for _ in range(3):
         y = np.array([MP.mpf(x) for x in found.random_state(rng)])
         change = along(lambda z: found.exactly("momentum", z), y, found.exactly("derivative", y))
         assert np.max(np.abs(change)) < 1e-14  # the state is a double's, its quaternions too
         assert np.max(np.abs(found.exactly("applied_force", y))) > 0.1
-
-
-# Random trees, with the loads put in by hand.
-
-
-def trees(dimensions: int, wanted: int) -> list[tuple[SpatialTree, str]]:
-    """Random trees with a motor, and with two bodies or more."""
-    found = []
-    for seed in range(400, 500):
-        tree, text = random_spatial_tree(seed, dimensions)
-        if tree.motor >= 0 and len(tree.bodies) > 1:
-            found.append((tree, text))
-        if len(found) == wanted:
-            break
-    return found
-
-
-def by_hand(
-    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Mapping[str, float], rope: bool
-) -> np.ndarray:
-    """Accelerations of a tree with the effects of the test below: they are linear in loads."""
-    q0 = q[tree.q_slices()[tree.motor]][0]
-    v0 = v[tree.v_slices()[tree.motor]][0]
-    torque = -(3.0 * (q0 - 0.4) + 0.6 * v0) - (0.2 * v0 + 0.7 * math.tanh(v0 / 0.3))
-    torque -= 50.0 * (q0 - min(max(q0, -0.1), 0.1))
-    u = {**u, "drive": u["drive"] + torque}
-    plain = solve(tree, q, v, u)
-    last = len(tree.bodies) - 1
-    a, b = np.array([0.1, 0.2, 0.3]), np.array([-0.3, 0.15, 0.1])
-    if tree.dimensions == PLANE:
-        a[2] = b[2] = 0.0
-    anchor = np.array([2.0, 1.0, 0.0])
-    places = {k: carried(plain, k).at(at) for k, at in ((0, a), (last, b))}
-    d, rate = places[last][0] - places[0][0], places[last][1] - places[0][1]
-    unit = d / np.linalg.norm(d)
-    stretch = np.linalg.norm(d) - 0.4
-    pull = (25.0 * stretch + 2.0 * unit @ rate) * unit
-    if rope and (stretch < 0 or pull @ unit < 0):
-        pull = 0 * pull
-    tied = 5.0 * (anchor - places[0][0])
-    return under(tree, q, v, [(0, a, pull + tied), (last, b, -pull)], u)
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("route", ["aba", "ldl"])
-@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
-def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route: str) -> None:
-    """A spring or rope between two bodies, one to the world, and all kinds at a joint."""
-    rng = np.random.default_rng(11)
-    for number, (tree, text) in enumerate(trees(dimensions, 2)):
-        rope = number % 2 == 1
-        zs = ("", "", "") if dimensions == PLANE else (", 0.3", ", 0.1", ", 0")
-        j = f"j{tree.motor}"
-        text += between(
-            "b0", f"b{len(tree.bodies) - 1}", f"at_1 = [0.1, 0.2{zs[0]}]",
-            f"at_2 = [-0.3, 0.15{zs[1]}]", "stiffness = 25.0", "damping = 2.0",
-            "rest_length = 0.4", f"tension_only = {str(rope).lower()}", name="e1",
-        )  # fmt: skip
-        text += between(
-            "world", "b0", f"at_1 = [2, 1{zs[2]}]", f"at_2 = [0.1, 0.2{zs[0]}]",
-            "stiffness = 5.0", name="e2",
-        )  # fmt: skip
-        text += at_joint(
-            "joint_spring", "stiffness = 3.0", "rest = 0.4", "damping = 0.6", joint=j, name="e3"
-        )
-        text += at_joint(
-            "joint_friction", "viscous = 0.2", "coulomb = 0.7", "speed = 0.3", joint=j, name="e4"
-        )
-        text += at_joint(
-            "joint_stop", "low = -0.1", "high = 0.1", "stiffness = 50.0", joint=j, name="e5"
-        )
-        module = made(text, route, jacobian=False).module
-        for _ in range(4):
-            q, v = random_state(tree, rng)
-            u = {**tree.random_inputs(rng)}
-            y = np.empty(len(module.STATES))
-            y[tree.places(module.STATES)] = np.concatenate((q, v))
-            rates = module.derivative(0.0, y, None, u)[tree.places(module.STATES)][len(q) :]
-            assert apart(rates, by_hand(tree, q, v, u, rope)) < 1e-10
 
 
 # Points that meet.
@@ -384,12 +232,8 @@ ZERO_CASES = {
 )
 def test_points_may_meet(case: str, dimensions: int) -> None:
     """At zero distance and 0.3 ε from it all is finite, and so is every derivative; k d, c ḋ."""
-    pair = PAIR.format(dimensions) + "[parameters]\ng0 = 1.0\n"
-    if dimensions == SPACE:
-        pair = pair.replace("inertia_com = 0.3", "inertia_com = [0.3, 0.2, 0.25]")
-        pair = pair.replace("inertia_com = 0.2\n", "inertia_com = [0.1, 0.2, 0.25]\n")
     lines = ZERO_CASES[case]
-    found = made(pair + between("a", "b", *lines))
+    found = made(PAIRS[dimensions] + between("a", "b", *lines) + "[parameters]\ng0 = 1.0\n")
     module = found.module
     names = list(module.STATES)
     y = np.zeros(len(names))
@@ -467,10 +311,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("number", range(len(BAD)))
-def test_bad_input_gets_one_clear_line(number: int) -> None:
+@pytest.mark.parametrize("table", BAD)
+def test_bad_input_gets_one_clear_line(table: str) -> None:
     """Place, value, remedy."""
-    table, message = list(BAD.items())[number]
-    with pytest.raises(SceneError) as error:
-        elaborate(parse_scene(SLIDER + table))
-    assert str(error.value).removeprefix("scene: ") == message
+    assert refusal(SLIDER + table) == BAD[table]
