@@ -14,7 +14,7 @@ from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.labels import with_clear_labels
-from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
+from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, is_held, numbers, skeleton
 
 Expr = Any
 PANEL, PANEL_BODY = 230.0, 92.0
@@ -71,10 +71,11 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
             torques.setdefault(at(start), {})[label] = None
         else:
             forces.append((at(start), direction, label, style))
-    if shape.own is not None:
+    held = {x.joint.name for x in model.bodies if is_held(model, x)}
+    if shape.own is not None and body.joint.name in held:
         name = body.joint.name
         forces.append((at(shape.own), _unknown(name, -1), -joint_force(name), "force"))
-    for name, p in shape.others:
+    for name, p in ((name, p) for name, p in shape.others if name in held):
         forces.append((at(p), _unknown(name, 1), joint_force(name), "force"))
     items: list[Item] = [*skeleton(shape, at)]
     items.append(Dot(at(shape.centre), 3.2, True))

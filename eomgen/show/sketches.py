@@ -34,21 +34,24 @@ MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class Shape:
-    """A body in the plane of the paper, m: centre of mass, own joint, joints of its children."""
+    """A body in the plane of the paper, m: centre of mass, own joint, joints of its children, pins
+    that close loops.
+    """
 
     body: Body
     centre: Point
     own: Point | None
     others: tuple[tuple[str, Point], ...]
+    pins: tuple[Point, ...]
     axes: tuple[Point, ...]
     loaded: tuple[Point, ...]
     """Points off the centre of mass at which effects act."""
 
     @property
     def joints(self) -> list[Point]:
-        """Its own joint and those of its children."""
+        """Its own joint, those of its children, and the pins."""
         own = [] if self.own is None else [self.own]
-        return [*own, *(p for _, p in self.others)]
+        return [*own, *(p for _, p in self.others), *self.pins]
 
     @property
     def points(self) -> list[Point]:
@@ -95,6 +98,15 @@ class Pose:
                 for child in model.bodies
                 if child.parent == k and child.joint.holds
             )
+            pins = tuple(
+                self.point(body.name, self._vector(at))
+                for loop in model.loops
+                for name, at in (
+                    (loop.joint.parent, loop.joint.r_parent),
+                    (loop.joint.child, loop.joint.r_child),
+                )
+                if name == body.name
+            )
             axes = tuple(
                 self.flat(self.state.outward(body.name, tuple(float(i == j) for j in range(n))))
                 for i in range(n)
@@ -102,11 +114,19 @@ class Pose:
             centre = self.point(body.name, (0.0,) * n)
             at = dict.fromkeys(load.at for load in _loads_at(body.name, effects) if any(load.at))
             loaded = tuple(self.point(body.name, numbers(model, x)) for x in at)
-            found.append(Shape(body, centre, own, others, axes, loaded))
+            found.append(Shape(body, centre, own, others, pins, axes, loaded))
         return tuple(found)
 
     def _vector(self, parts: Iterable[Any]) -> tuple[float, ...]:
         return tuple(self.model.value(part) for part in parts)
+
+
+def is_held(model: Model, body: Body) -> bool:
+    """Whether a body's joint keeps it from moving freely in all directions."""
+    given = {each.position.name for each in model.prescribed}
+    kinds = [p.kind for p in body.joint.primitives(model.dimensions)]
+    slides = kinds.count("prismatic") == model.dimensions
+    return body.joint.holds and not (slides and given.isdisjoint(x.name for x in body.positions))
 
 
 def _loads_at(body: str, effects: Sequence[DerivedEffect]) -> Iterator[Load]:
@@ -239,11 +259,13 @@ def _marks(shape: Shape, at: Any, model: Model, few: bool) -> Iterator[Item]:
     yield Dot(centre, 3.2, True)
     if few:
         yield Label((centre[0] - 11, centre[1] - 12), shape.body.name, "axis")
-    if shape.own is not None:
+    if shape.own is not None and is_held(model, shape.body):
         own = at(shape.own)
         if shape.body.parent < 0:
             yield from _ground(own)
         yield Dot(own, 4.2, False, "arm")
+    for pin in shape.pins:
+        yield Dot(at(pin), 4.2, False, "arm")
 
 
 def _ground(p: Point) -> Iterator[Item]:

@@ -22,11 +22,13 @@ from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Shape, Sphere, n
 from eomgen.scene.reader import built_in_names, parse_scene
 from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
+from eomgen.show.drawing import Dot, Line, Point
 from eomgen.show.marks import marks_of
 from eomgen.show.of_run import world_points
 from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of, shapes_of
 from eomgen.show.picture_data import geometry_values, picture_data
+from eomgen.show.sketches import mechanism_sketch
 from eomgen.show.solid import rotation
 from eomgen.show.strokes import Sight, strokes
 from eomgen.show.symbols import END, WIND
@@ -354,3 +356,21 @@ def test_a_model_knows_nothing_of_pictures_nor_of_integrators() -> None:
     assert appearance_of(other) != appearance_of(scene)
     assert elaborate(other) == elaborate(scene)
     assert all(isinstance(part, Constant) for part in scene.bodies[0].shapes[0].size[1:])  # type: ignore[union-attr]
+
+
+def test_a_sketch_closes_loops_and_holds_nothing_that_flies() -> None:
+    """In a four-bar linkage two bars meet in each of the moving pins, and the others stand on the
+    ground; a ball that flies has no joint, as a pendulum has.
+    """
+    bars, pins = _bars_and_pins(eomgen.check("four_bar"))
+    assert sorted(sum(pin in bar for bar in bars) for pin in pins) == [1, 1, 2, 2]
+    ball = FREE.replace('"free"', '"planar"\nparent = "world"').format(n=2, inertia=1, shapes="")
+    assert not _bars_and_pins(elaborate(parse_scene(ball)))[1]
+    assert len(_bars_and_pins(eomgen.check("pendulum"))[1]) == 1
+
+
+def _bars_and_pins(model: Model) -> tuple[list[tuple[Point, ...]], set[Point]]:
+    items = mechanism_sketch(model, ()).items
+    bars = [item.points for item in items if isinstance(item, Line) and item.style == "body"]
+    pins = {item.centre for item in items if isinstance(item, Dot) and item.style == "arm"}
+    return bars, pins
