@@ -1,7 +1,8 @@
 """Writes the pages that are made from the program itself: `python tools/pages.py`.
 
 docs/commands.md from the command line's own help, docs/functions.md from the docstrings of the
-public functions and classes, docs/reference and eomgen/entries.pyi from the tables of scenes.
+public functions and classes, docs/reference and eomgen/entries.pyi from the tables of scenes, the
+diagrams of docs/course from their scenes.
 """
 
 import argparse
@@ -16,8 +17,18 @@ import eomgen
 from eomgen.commands.main import parsers
 from eomgen.scene.entries import stub
 from eomgen.scene.reference import reference_pages
+from eomgen.show.drawing import svg
+from eomgen.show.sketches import mechanism_sketch
 
 DOCS = Path(__file__).parent.parent / "docs"
+BUILT_IN_LESSONS = {
+    "two-bodies": "two_body",
+    "many-joints": "double_pendulum",
+    "loops": "four_bar",
+    "space": "spinning_top",
+}
+LESSONS = ("particle", "body", "joint", *BUILT_IN_LESSONS, "contact")
+"""The lessons of the course, and those whose mechanism is a built-in scene."""
 
 COMMANDS = """\
 # Commands
@@ -119,12 +130,28 @@ def reference_index() -> str:
     return pages["index.md"] + "\n" + "\n".join(fence)
 
 
+def lesson_scene(name: str) -> str:
+    """The scene of a lesson of the course: the text of its first file, or a built-in name."""
+    page = (DOCS / "course" / f"{name}.md").read_text("utf-8")
+    if name in BUILT_IN_LESSONS:
+        return BUILT_IN_LESSONS[name]
+    return page.split("```toml\n", 1)[1].split("```", 1)[0]
+
+
+def lesson_sketch(name: str) -> str:
+    """The diagram of a lesson: its mechanism at the start."""
+    drawn = svg(mechanism_sketch(eomgen.check(lesson_scene(name)), ()))
+    drawn = drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
+    return drawn.replace("var(--paper)", "#fff") + "\n"
+
+
 PAGES: dict[str, Callable[[], str]] = {
     "commands.md": commands_page,
     "functions.md": functions_page,
     **{f"reference/{name}": partial(_of_reference, name) for name in reference_pages()},
     "reference/index.md": reference_index,
     "../eomgen/entries.pyi": stub,
+    **{f"course/{name}.svg": partial(lesson_sketch, name) for name in LESSONS},
 }
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ PAGES = [
     DOCS / "pictures.md",
     *sorted((DOCS / "howto").glob("*.md")),
     *sorted((DOCS / "concepts").glob("*.md")),
+    *sorted((DOCS / "course").glob("*.md")),
     DOCS / "architecture.md",
 ]
 SHORT = [DOCS / "howto" / "lecture.md", DOCS / "howto" / "scene.md"]
@@ -105,6 +106,20 @@ def python(content: str) -> list[str]:
 def test_pages_made_from_the_program_are_fresh(name: str) -> None:
     """`python tools/pages.py` writes them."""
     assert (DOCS / name).read_text("utf-8") == pages.PAGES[name]()
+
+
+@pytest.mark.parametrize("name", pages.LESSONS)
+def test_a_lesson_has_all_its_parts(name: str) -> None:
+    """A diagram, a derivation, a live page of its scene, and three exercises, each with a solution
+    that `test_a_page_does_what_it_says` runs.
+    """
+    text = (DOCS / "course" / f"{name}.md").read_text("utf-8")
+    assert f"]({name}.svg)" in text and "eomgen.derive(" in text
+    built_in = pages.BUILT_IN_LESSONS.get(name)
+    own = "" if built_in else tomllib.loads(pages.lesson_scene(name))["name"]
+    assert f'src="{f"../gallery/{built_in}" if built_in else f"live/{own}"}.html"' in text
+    exercises = text.split("## Exercises\n")[1].split("<details><summary>Solution</summary>")
+    assert len(exercises) == 4 and all("```python" in each for each in exercises[1:])
 
 
 def test_pages_are_linked() -> None:
