@@ -16,7 +16,7 @@ from eomgen.api.states import values_by_index
 from eomgen.base.errors import RunError, listed, nearest
 from eomgen.base.options import taking
 from eomgen.fitting.columns import Columns, sorted_columns
-from eomgen.fitting.estimate import Estimate, Residuals, Sought, Weighed, estimated
+from eomgen.fitting.estimate import Estimate, Residuals, Sought, Weighed, estimated, told
 from eomgen.fitting.logs import Data, Log, read_log
 from eomgen.fitting.motion import Motion, Samples
 from eomgen.model.model import Model
@@ -230,7 +230,7 @@ class _Fitting:
         for array, there in zip(every, self._there, strict=True):
             begin, end = end, end + int(there.sum())
             array[there] = found.residuals[begin:end]
-        notes = [_told(direction, names) for direction in found.unknown]
+        notes = [told(direction, names) for direction in found.unknown]
         held = (found.values <= sought.low) | (found.values >= sought.high)
         notes += [
             f"{name} is at its bound, and its interval is that of a fit without one"
@@ -253,16 +253,6 @@ class _Fitting:
             found.calls,
             self._motion.compiled,
         )
-
-
-def _told(direction: FloatArray, names: Sequence[str]) -> str:
-    """A line about values that the data do not tell, or not apart."""
-    taking_part = [(name, x) for name, x in zip(names, direction.tolist(), strict=True) if x]
-    if len(taking_part) == 1:
-        return f"{taking_part[0][0]} has no effect on what is measured"
-    changes = ", ".join(f"{name} by {x:+.3g} %" for name, x in taking_part)
-    together = " and ".join(name for name, _ in taking_part)
-    return f"{together} cannot be told apart: nothing measured changes if {changes} change together"
 
 
 def _logs(data: Data | Sequence[Data]) -> list[Log]:

@@ -5,13 +5,14 @@ import sys
 
 from eomgen.api.given import checked
 from eomgen.commands.assembling import draw_assembly, print_assembly
+from eomgen.commands.identifying import print_identifiable
 from eomgen.commands.shared import (
     FEW,
     Arguments,
     overlap_lines,
     print_listed,
     print_wrapped,
-    read_model,
+    read_whole,
     reporter_of,
     shortened,
 )
@@ -38,8 +39,9 @@ def print_reference(given: Arguments) -> int:
 
 def check(given: Arguments) -> int:
     """Validate a scene; print its bodies, joints, degrees of freedom, limits and effects."""
-    model, _ = read_model(given.scene, given)
-    checked(model, reporter_of(given, given.scene))
+    scene, model, _ = read_whole(given.scene, given)
+    reporter = reporter_of(given, given.scene)
+    checked(model, reporter)
     most = sys.maxsize if given.long else FEW
     print(f"{model.name}: {model.title}")
     print(f"dimensions  {model.dimensions}: {'the plane' if model.dimensions == 2 else 'space'}")
@@ -69,6 +71,8 @@ def check(given: Arguments) -> int:
     print_listed("parameters  ", shortened(values, most))
     if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:
         print(f"            eomgen check {shlex.quote(given.scene)} --long lists all")
+    if given.identifiable is not None:
+        print_identifiable(model, given.identifiable, scene.simulation.t_end, reporter)
     if given.assemble:
         print_assembly(model)
     if given.picture is not None:

@@ -258,6 +258,15 @@ class Check(Forced):
     """The options of `check`."""
 
     long: bool = option(False, "do not shorten long lists")
+    identifiable: Sequence[str] | None = option(
+        None,
+        "print the base parameters, which torques and motions of joints tell; and of these states "
+        "and outputs, which parameters they tell",
+        value="A,B,…",
+        read=names_in,
+        alone=(),
+        count="?",
+    )
     assemble: bool = option(False, "print how the start of a mechanism with loops fits")
     picture: Path | None = option(None, "draw the start (png, pdf, svg)", value="FILE")
 

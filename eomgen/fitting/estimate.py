@@ -260,6 +260,23 @@ def _judged(
     return Estimate(values, covariance, half, rank, unknown, found.values, noise, calls.made, why)
 
 
+def determined(slopes: FloatArray, values: FloatArray) -> tuple[int, list[FloatArray]]:
+    """The rank of derivatives (N, n) by values, and the combinations that these do not tell."""
+    of = _decomposed(slopes)
+    is_known = of.sizes > SMALL
+    return int(is_known.sum()), _reduced(of.right[~is_known] / of.lengths, values)
+
+
+def told(direction: FloatArray, names: Sequence[str]) -> str:
+    """A line about values that are not told, or not apart."""
+    taking_part = [(name, x) for name, x in zip(names, direction.tolist(), strict=True) if x]
+    if len(taking_part) == 1:
+        return f"{taking_part[0][0]} has no effect on what is measured"
+    changes = ", ".join(f"{name} by {x:+.3g} %" for name, x in taking_part)
+    together = " and ".join(name for name, _ in taking_part)
+    return f"{together} cannot be told apart: nothing measured changes if {changes} change together"
+
+
 def _reduced(directions: FloatArray, values: FloatArray) -> list[FloatArray]:
     """A basis of the space of some directions with as few members as there can be, relative to the
     values that are not 0: its reduced row echelon form.
