@@ -135,12 +135,25 @@ def lesson_scene(name: str) -> str:
     page = (DOCS / "course" / f"{name}.md").read_text("utf-8")
     if name in BUILT_IN_LESSONS:
         return BUILT_IN_LESSONS[name]
-    return page.split("```toml\n", 1)[1].split("```", 1)[0]
+    return _first_scene(page)
 
 
 def lesson_sketch(name: str) -> str:
     """The diagram of a lesson: its mechanism at the start."""
-    drawn = svg(mechanism_sketch(eomgen.check(lesson_scene(name)), ()))
+    return _sketch(lesson_scene(name))
+
+
+def crane_sketch() -> str:
+    """The diagram of the tutorial's first scene."""
+    return _sketch(_first_scene((DOCS / "tutorial.md").read_text("utf-8")))
+
+
+def _first_scene(page: str) -> str:
+    return page.split("```toml\n", 1)[1].split("```", 1)[0]
+
+
+def _sketch(scene: str) -> str:
+    drawn = svg(mechanism_sketch(eomgen.check(scene), ()))
     drawn = drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
     return drawn.replace("var(--paper)", "#fff") + "\n"
 
@@ -151,6 +164,7 @@ PAGES: dict[str, Callable[[], str]] = {
     **{f"reference/{name}": partial(_of_reference, name) for name in reference_pages()},
     "reference/index.md": reference_index,
     "../eomgen/entries.pyi": stub,
+    "pictures/crane.svg": crane_sketch,
     **{f"course/{name}.svg": partial(lesson_sketch, name) for name in LESSONS},
 }
 

@@ -1,9 +1,15 @@
-"""Draws the pictures of docs/pictures.md: `python tools/pictures.py`.
+"""Draws the pictures of docs/pictures.md and of the tutorial: `python tools/pictures.py`.
 
-Each is a small scene at one time: a shape, an element of an effect, or a mode of the camera.
+Each of the former is a small scene at one time: a shape, an element of an effect, or a mode of the
+camera. The latter are what the tutorial's own commands draw: `python tools/pictures.py tutorial`.
 """
 
+import contextlib
+import re
+import shutil
+import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -145,9 +151,16 @@ CAMERAS = {
 }
 
 
+TUTORIAL = {"5": "crane.png", "7": "crane.png", "8": "crane.png", "10": "crane_sweep.png"}
+"""Figures of the tutorial by the number of the step."""
+
+
 def main(names: list[str]) -> None:
     """Write all pictures, or those of some names."""
     FOLDER.mkdir(exist_ok=True)
+    if not names or "tutorial" in names:
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            tutorial()
     for name, text in SCENES.items():
         if not names or name in names:
             run = eomgen.simulate(parse_scene(text), t_end=LONGER.get(name, 1e-4))
@@ -160,6 +173,22 @@ def main(names: list[str]) -> None:
             if scene.camera.follow:
                 scene = scene.replaced(camera=scene.camera.replaced(follow="A"))
             save(name, eomgen.simulate(scene).motion, whole=True)
+
+
+def tutorial() -> None:
+    """Run the files and commands of the tutorial, and keep the figures that `TUTORIAL` names."""
+    page = (FOLDER.parent / "tutorial.md").read_text("utf-8")
+    for heading, part in re.findall(r"^## (\d+)\..*?\n(.*?)(?=^## )", page, re.M | re.S):
+        for language, text in re.findall(r"^```(\w+)\n(.*?)^```", part, re.M | re.S):
+            if language == "toml":
+                mode = "a" if text.startswith("# append") else "w"
+                with Path("crane.toml").open(mode, encoding="utf-8") as file:
+                    file.write("\n" + text)
+            for line in text.splitlines() if language == "sh" else ():
+                subprocess.run([sys.executable, "-m", *line.split()], check=True)
+        if heading in TUTORIAL:
+            figure = Path("out", TUTORIAL[heading])
+            shutil.copy(figure, FOLDER / f"tutorial_{heading}.png")
 
 
 def save(name: str, motion: Motion, whole: bool = False) -> None:
