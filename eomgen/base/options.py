@@ -8,7 +8,7 @@ record come from there, and so do the command, its completion and the pages of r
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
-from functools import wraps
+from functools import cache, wraps
 from inspect import Parameter, Signature, cleandoc
 from typing import Any, ParamSpec, TypeVar
 
@@ -74,8 +74,13 @@ def option(default: Any, *words: str, **more: Any) -> Any:
     return field(default=default, metadata=about(*words, **more))
 
 
-def options_of(record: Any) -> "dict[Field[Any], Option]":
-    """The options of a record, in their order."""
+def options_of(record: Any) -> "Mapping[Field[Any], Option]":
+    """The options of a record, or of a kind of these, in their order."""
+    return _of_kind(record if isinstance(record, type) else type(record))
+
+
+@cache
+def _of_kind(record: Any) -> "Mapping[Field[Any], Option]":
     return {each: each.metadata["option"] for each in fields(record) if each.metadata}
 
 

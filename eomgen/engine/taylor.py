@@ -165,7 +165,8 @@ def order_of(rtol: float) -> int:
     error is within a tenth of the least one.
     """
     order = LOWEST
-    while order < HIGHEST and order < 5.0 - log(rtol) / 2.0:
+    wanted = 5.0 - log(rtol) / 2.0
+    while order < HIGHEST and order < wanted:
         order += 1
     return order
 
@@ -184,6 +185,7 @@ def reach(
     """
     allowed = run.atol + run.rtol * abs(y)
     larger = -inf
+    fall = log(run.rtol) / order  # that of the tolerance
     for k in range(order, order - LOOKED_AT, -1):
         term = abs(rows[k]) / allowed
         largest = 0.0
@@ -192,7 +194,7 @@ def reach(
         if largest > 0.0:
             slope = log(largest) / k
             if k < order - 1:  # the fall of terms, by that of the tolerance from here to the end
-                slope = log(largest * run.rtol) / k - log(run.rtol) / order - HARDLY
+                slope = log(largest * run.rtol) / k - fall - HARDLY
             larger = max(larger, slope)
     length = exp(-larger)
     return min(length, run.longest)

@@ -61,7 +61,9 @@ class Mechanism(ctypes.Structure):
     def holding(
         self, states: int, constrained: Constrained | None, touched: Touched | None
     ) -> "Mechanism":
-        """A copy for steps of so many states, with their constraints and rigid contacts."""
+        """The same for steps of so many states, with their constraints and rigid contacts."""
+        if constrained is None and touched is None:
+            return self
         made = self.having(constrained, touched)
         if constrained is not None:
             onto = _constraints(made, states, constrained)

@@ -1,36 +1,60 @@
 """Memory that C writes to."""
 
 import ctypes
+from functools import lru_cache
 from math import prod
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from eomgen.subset.structures import address, fields_of, structure
 
 T = TypeVar("T")
+KINDS = (np.float64, np.int64)
+
+
+class _Part(NamedTuple):
+    """An array of a block: its name, the number of its kind, where it lies, and its shape."""
+
+    name: str
+    kind: int
+    first: int
+    last: int
+    shape: tuple[int, ...]
+
+
+@lru_cache(64)
+def _layout(record: Any, given: tuple[tuple[str, int], ...]) -> tuple[list[_Part], list[int]]:
+    """The arrays of a record but those given, and the sizes of the blocks that hold them; `given`
+    are sizes, and -1 for an array.
+    """
+    of, parts, sizes = dict(given), list[_Part](), [0, 0]
+    for name, lengths, kind in fields_of(record)[1]:
+        if name in of:
+            continue
+        k, shape = KINDS.index(kind), tuple(length.of(of) for length in lengths)
+        last = sizes[k] + prod(shape)
+        parts.append(_Part(name, k, sizes[k], last, shape))
+        sizes[k] = last
+    return parts, sizes
 
 
 def room(record: type[T], **given: Any) -> tuple[T, ctypes.Structure]:
     """A record, and what C is given of it: as `subset.structures.with_room` and `filled` make them,
     but its arrays lie in one block for each kind of number, and are not set to anything.
     """
-    names, arrays = fields_of(record)  # type: ignore[arg-type]
+    known = tuple([(name, x if x.__class__ is int else -1) for name, x in given.items()])
+    parts, sizes = _layout(record, known)
+    blocks = [np.empty(size, kind) for size, kind in zip(sizes, KINDS, strict=True)]
+    starts = [address(block) if block.size else 0 for block in blocks]
+    names, _ = fields_of(record)  # type: ignore[arg-type]
     made = {name: x for name, x in given.items() if name in names}
-    places = {name: address(x) if x.size else 0 for name, x in made.items() if hasattr(x, "size")}
-    for kind in (np.float64, np.int64):
-        own = [
-            (name, [size.of(given) for size in sizes])
-            for name, sizes, of in arrays
-            if of is kind and name not in made
-        ]
-        block, first = np.empty(sum(prod(shape) for _, shape in own), kind), 0
-        start = address(block) if block.size else 0
-        for name, shape in own:
-            size = prod(shape)
-            made[name] = block[first : first + size].reshape(shape)
-            places[name] = start + 8 * first
-            first += size
-    whole = record(**made)
     of_c: Any = structure(record)  # type: ignore[arg-type]
-    return whole, of_c(*(places.get(n, getattr(whole, n)) for n, _ in of_c._fields_))
+    places = of_c()
+    for name, x in made.items():
+        is_array = x.__class__ is np.ndarray
+        setattr(places, name, x if not is_array else address(x) if x.size else 0)
+    for name, kind, first, last, shape in parts:
+        made[name] = blocks[kind][first:last].reshape(shape)
+        setattr(places, name, starts[kind] + 8 * first)
+    return record(**made), places

@@ -96,7 +96,8 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     slope = getattr(solver, "f", solver.y)
     begun = Start(*map(np.ascontiguousarray, (solver.y, slope, solver.lost)))
     start = filled(begun)
-    method.call.restype, method.call.argtypes = _WHOLE, [_POINTER] * 4
+    if method.call.argtypes is None:
+        method.call.restype, method.call.argtypes = _WHOLE, [_POINTER] * 4
     why = method.call(*map(ctypes.addressof, (checks, at, start, records)))
     take(kept, records)
     n = kept.made

@@ -1,7 +1,6 @@
 """Integration of a problem: checks of the arguments, the steps, and the trajectory."""
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -191,10 +190,11 @@ def _kept(run: "_Run", problem: Problem, settings: Resume) -> Resume:
     kept = run.resume() if run.resume else {}
     if not kept:
         return {}
-    rate = np.full(len(problem.states), np.nan)  # unknown if it is interrupted
-    stops = (ArithmeticError, ValueError, StepFailure, KeyboardInterrupt)
-    with np.errstate(all="ignore"), suppress(*stops):
-        rate = np.array(problem.derivative(float(kept["t"]), kept["y"]))
+    try:
+        with np.errstate(all="ignore"):
+            rate = np.array(problem.derivative(float(kept["t"]), kept["y"]))
+    except (ArithmeticError, ValueError, StepFailure, KeyboardInterrupt):  # it is not known
+        rate = np.full(len(problem.states), np.nan)
     return {**kept, **settings, "derivative": rate}
 
 
