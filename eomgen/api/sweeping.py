@@ -33,6 +33,7 @@ from eomgen.run.checks import (
 from eomgen.run.inputs import InputsOfTime
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
+from eomgen.run.through_events import THROUGH_EVENTS
 from eomgen.scene.schema import Scene
 from eomgen.study.accuracy.trial import Setting
 from eomgen.sweep.execute import chunk_size, execute
@@ -281,14 +282,17 @@ def _run_together(integrator: str, functions: Any) -> bool:
 
 def _mostly_in_c(integrator: str, functions: Any) -> bool:
     """Whether Python does so little in members that run one by one that threads serve them: if
-    compiled code makes almost all steps. For adaptive methods, whose steps are few, Python begins
-    anew after each event of rigid contacts, and steps that pass over a corner are repeated there.
+    compiled code makes almost all steps, and for adaptive methods, whose steps are few, goes
+    through the events of rigid contacts (`run.through_events`). Of adaptive steps Python repeats
+    those that pass over a corner, and begins anew after an event if it keeps constraints.
     """
     method = find_integrator(integrator)
     if isinstance(method, FixedStep) or not method.compiled:
         return bool(method.compiled)
-    contacts: tuple[str, ...] = getattr(functions, "CONTACTS", ())
-    return not contacts and not hasattr(functions, "switching_functions")
+    begins_anew = getattr(functions, "CONTACTS", ()) and (
+        integrator not in THROUGH_EVENTS or getattr(functions, "CONSTRAINTS", ())
+    )
+    return not begins_anew and not hasattr(functions, "switching_functions")
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:

@@ -8,6 +8,7 @@ from functools import cache
 
 from eomgen.engine import (
     adaptive,
+    adaptive_runs,
     adaptive_steps,
     branches,
     complementarity,
@@ -90,11 +91,14 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, adaptive_steps, equal_steps, explicit, implicit, rosenbrock, sampled, taylor)
+    adapted = (adaptive, adaptive_runs, adaptive_steps)
+    steps = (equal_steps, explicit, implicit, rosenbrock, sampled, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)
-    return Text.of(*steps, *solved, *checks, *held, differences, quaternions, sums, system)
+    return Text.of(
+        *adapted, *steps, *solved, *checks, *held, differences, quaternions, sums, system
+    )
 
 
 def c_source(functions: Roots, language: Language = C) -> str:

@@ -28,9 +28,19 @@ from eomgen.native import contact_runs, equal_steps, functions, implicit, runs, 
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.native.mechanism import FUNCTIONS, Given, Mechanism, mechanism
 from eomgen.program.program import Program
-from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps, Strikes
+from eomgen.run.compiled import (
+    Compiled,
+    EqualSteps,
+    Series,
+    Steps,
+    Stretch,
+    Stride,
+    Strikes,
+    Through,
+)
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
+from eomgen.run.through_events import THROUGH_EVENTS
 from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of, package_digest
 
@@ -155,7 +165,9 @@ class Accelerator:
         def of_solutions() -> Series:
             return found.series.series if found.series else plain()
 
-        compiled = Compiled(problem.derivative, found.steps, found.equal, found.strikes)
+        compiled = Compiled(
+            problem.derivative, found.steps, found.equal, found.strikes, found.through
+        )
         return replace(
             problem, compiled=compiled, series={**problem.series, "taylor": of_solutions}
         )
@@ -280,8 +292,8 @@ class _Steps:
 
     def steps(self, name: str, needed: tuple[str, ...]) -> Steps | None:
         """See `Compiled`."""
-        if name == "taylor":  # its steps are not checked
-            return self.series.steps if not needed and self.series else None
+        if name == "taylor":
+            return self._by_series(needed)
         if name == "DOP853":
             return self._once(name, ("derivative", *needed), partial(partial, runs.dop853))
         problem, meets = self._problem, set(self._contacts) & set(needed)
@@ -289,6 +301,40 @@ class _Steps:
         further = tuple(x for x in needed if x not in own)
         make = partial(partial, implicit.rodas_5p, problem)
         return self._once(name, (*further, *own), make)
+
+    def _by_series(self, needed: tuple[str, ...]) -> Steps | None:
+        """Steps by Taylor series, and by DOP853 while contacts are held, whose forces have none."""
+        series = self.series
+        if series is None or not needed:
+            return None if series is None else series.steps
+
+        def make(of: Mechanism, _: ctypes.CDLL) -> Steps:
+            return partial(series.steps, of=of)
+
+        def make_held(of: Mechanism, library: ctypes.CDLL) -> Steps:
+            return partial(runs.held, of, library)
+
+        free = self._once("taylor", ("derivative", *needed, "taylor"), make)
+        if not self._contacts:
+            return free
+        held = self._once("held", ("derivative", *needed), make_held)
+
+        def steps(stretch: Stretch) -> Stride:
+            assert free and held
+            is_held = stretch.touched and stretch.touched.now.holds.any()
+            return (held if is_held else free)(stretch)
+
+        return steps if free and held else None
+
+    def through(self, name: str) -> Through | None:
+        """See `Compiled`."""
+        if not self._contacts or name not in THROUGH_EVENTS:
+            return None
+        if name == "DOP853":
+            needed: tuple[str, ...] = ("derivative", *self._contacts)
+            return self._once("through", needed, partial(partial, runs.through))
+        make = partial(partial, implicit.through, self._problem)
+        return self._once("through", implicit.needed(name, self._problem), make)
 
     def equal(self, name: str) -> EqualSteps | None:
         """See `Compiled`."""

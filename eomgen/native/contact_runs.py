@@ -12,6 +12,8 @@ from eomgen.subset.structures import filled, take
 
 ROOTS: list[tuple[str, Mapping[str, Any]]] = [("taken", {}), ("strike", {})]
 """What is called of the engine."""
+WHOLE_RUNS: list[tuple[str, Mapping[str, Any]]] = [("through_events", {})]
+"""The same for runs from start to end by methods with tolerances."""
 FUNCTIONS = ("gaps", "gap_rates", "held", "impact")
 _POINTER, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 

@@ -16,10 +16,11 @@ from eomgen.engine.adaptive import Bounds
 from eomgen.engine.elimination import Factors
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
+from eomgen.engine.rosenbrock import Rodas
 from eomgen.native import contact_runs, equal_steps, strides
 from eomgen.native.mechanism import KERNELS, Mechanism
 from eomgen.native.mechanism import context as of_mechanism
-from eomgen.run.compiled import EqualSteps, Stretch, Stride
+from eomgen.run.compiled import Array, EqualSteps, Stretch, Stride, WholeRun
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import between, rodas
@@ -91,7 +92,9 @@ def sources(library: str, states: int) -> Mapping[str, str]:
             del roots[0]
     else:
         roots += strides.ROOTS
-    roots += [*contact_runs.ROOTS, ("differences", {})] if of.contacts else []
+    if of.contacts:
+        roots += [*contact_runs.ROOTS, ("differences", {})]
+        roots += [] if name in EQUAL else contact_runs.WHOLE_RUNS
     context = {
         **of_mechanism(),
         **contact_runs.values(of.contacts, of.pressed),
@@ -146,13 +149,28 @@ def _with(of: Mechanism, problem: Problem, **room: Any) -> Mechanism:
 
 def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Steps of Rodas5P."""
-    solver, touched, ny = stretch.solver, stretch.touched, len(problem.states)
+    solver, touched = stretch.solver, stretch.touched
     is_held = touched is not None and bool(touched.now.holds.any())
-    bounds = Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until)
-    run = rodas(ny, bounds, problem.leading_positions, problem.timed or is_held)
+    run = _rodas(problem, stretch, is_held)
     run.h_last, run.error = solver.h_last, solver.error
-    method = strides.Method(
-        library.adaptive, ("h_abs", "h_last", "error", "lost"), COUNTS, 4, between
-    )
-    own = _with(of, problem, stages=run, room=with_room(Factors, n=ny))
-    return strides.steps(method, own, stretch)
+    return strides.steps(_method(library.adaptive), _with_rodas(of, problem, run), stretch)
+
+
+def through(problem: Problem, of: Mechanism, library: ctypes.CDLL, run: WholeRun) -> Array | None:
+    """The rows of a run by Rodas5P, see `run.compiled.Compiled`."""
+    own = _with_rodas(of, problem, _rodas(problem, run.stretch))
+    return strides.rows_of(_method(library.through), own, run)
+
+
+def _method(call: Any) -> strides.Method:
+    return strides.Method(call, ("h_abs", "h_last", "error", "lost"), COUNTS, 4, between)
+
+
+def _rodas(problem: Problem, stretch: Stretch, is_held: bool = False) -> Rodas:
+    bounds = Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until)
+    timed = problem.timed or is_held
+    return rodas(len(problem.states), bounds, problem.leading_positions, timed)
+
+
+def _with_rodas(of: Mechanism, problem: Problem, run: Rodas) -> Mechanism:
+    return _with(of, problem, stages=run, room=with_room(Factors, n=len(problem.states)))

@@ -44,12 +44,13 @@ def room(record: type[T], **given: Any) -> tuple[T, ctypes.Structure]:
     but its arrays lie in one block for each kind of number, and are not set to anything.
     """
     known = tuple([(name, x if x.__class__ is int else -1) for name, x in given.items()])
-    parts, sizes = _layout(record, known)
+    kind: Any = record
+    parts, sizes = _layout(kind, known)
     blocks = [np.empty(size, kind) for size, kind in zip(sizes, KINDS, strict=True)]
     starts = [address(block) if block.size else 0 for block in blocks]
-    names, _ = fields_of(record)  # type: ignore[arg-type]
+    names, _ = fields_of(kind)
     made = {name: x for name, x in given.items() if name in names}
-    of_c: Any = structure(record)  # type: ignore[arg-type]
+    of_c: Any = structure(kind)
     places = of_c()
     for name, x in made.items():
         is_array = x.__class__ is np.ndarray

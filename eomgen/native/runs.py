@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Mapping
+from typing import Any
 
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
@@ -12,7 +13,7 @@ from eomgen.native.functions import restricted
 from eomgen.native.mechanism import Mechanism
 from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.program import Program
-from eomgen.run.compiled import Stretch, Stride
+from eomgen.run.compiled import Array, Stretch, Stride, WholeRun
 from eomgen.run.integrators.dormand_prince_8 import interpolated
 
 MAIN = "runs.c"
@@ -29,7 +30,8 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     roots = [*equal_steps.roots_of(*equal_steps.METHODS), ("equal_steps", {})]
     roots += [(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")]
     roots += [("within", {}), *strides.ROOTS]
-    roots += contact_runs.ROOTS if of_contacts["contacts"] else []
+    if of_contacts["contacts"]:
+        roots += [*contact_runs.ROOTS, *contact_runs.WHOLE_RUNS]
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
@@ -46,7 +48,20 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     return {**c.library(program, interface), MAIN: main}
 
 
+def _method(call: Any, *memory: str) -> strides.Method:
+    return strides.Method(call, memory or ("h_abs", "f", "lost"), (), 7, interpolated)
+
+
 def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Steps of DOP853."""
-    method = strides.Method(library.adaptive, ("h_abs", "f", "lost"), (), 7, interpolated)
-    return strides.steps(method, of, stretch)
+    return strides.steps(_method(library.adaptive), of, stretch)
+
+
+def held(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
+    """Those by which contacts are held between steps by Taylor series."""
+    return strides.steps(_method(library.held_steps, "h_abs", "lost"), of, stretch)
+
+
+def through(of: Mechanism, library: ctypes.CDLL, run: WholeRun) -> Array | None:
+    """The rows of a run by DOP853, see `run.compiled.Compiled`."""
+    return strides.rows_of(_method(library.through), of, run)

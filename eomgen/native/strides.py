@@ -8,6 +8,7 @@ from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eomgen.engine.adaptive import EVENT, UNUSUAL, Bounds, Progress
 from eomgen.engine.adaptive_steps import Records, Start
@@ -18,7 +19,7 @@ from eomgen.native import contact_runs
 from eomgen.native.mechanism import Mechanism, made_margins
 from eomgen.native.memory import room
 from eomgen.run import branches
-from eomgen.run.compiled import Array, Stretch, Stride, Watched
+from eomgen.run.compiled import Array, Stretch, Stride, Watched, WholeRun
 from eomgen.subset.structures import address, filled, take
 
 ROOTS: list[Root] = [
@@ -75,16 +76,39 @@ class _Checks(ctypes.Structure):
     )
 
 
-def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
-    """Steps of a method for a mechanism."""
-    solver, most, touched = stretch.solver, stretch.most, stretch.touched
+class _Given(NamedTuple):
+    """What C is given of steps, of which all else lives as long; and what it records of them, of
+    branches and of constraints.
+    """
+
+    checks: ctypes.Structure
+    at: ctypes.Structure
+    start: ctypes.Structure
+    records: ctypes.Structure
+    kept: Records
+    begun: Start
+    system: Mechanism
+    run: ctypes.Structure
+    seen: "_Checked"
+    switched: Array
+    values: Array
+    switches: NDArray[np.int64]
+    margins: Array
+
+    @property
+    def addresses(self) -> tuple[int, ...]:
+        """Those of what C is given."""
+        return tuple(map(ctypes.addressof, self[:4]))
+
+
+def _given(method: Method, of: Mechanism, stretch: Stretch) -> _Given:
+    solver, most = stretch.solver, stretch.most
     watched, held, ny = stretch.watched, stretch.constrained, len(solver.y)
     seen = _Checked.of(watched, ny) if watched else _unchecked(ny)
-    is_held = touched is not None and touched.now.holds.any()
     kept, records = _records(method, stretch)
     switched, values = np.empty(most), np.empty((most, seen.watch.many))
     switches, margins = np.zeros(most, np.int64), made_margins(held, most)
-    system = of.holding(ny, held, touched)
+    system = of.holding(ny, held, stretch.touched)
     bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
     run = filled(Bounds(*bounds, stretch.dense, stretch.reaches, stretch.counts_terms))
     at = filled(Progress(solver.t, length=0.0 if method.follows else float(solver.h_abs)))
@@ -95,16 +119,28 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     )
     slope = getattr(solver, "f", solver.y)
     begun = Start(*map(np.ascontiguousarray, (solver.y, slope, solver.lost)))
-    start = filled(begun)
+    made = filled(begun)
+    return _Given(
+        *(checks, at, made, records, kept, begun, system, run, seen),
+        *(switched, values, switches, margins),
+    )
+
+
+def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
+    """Steps of a method for a mechanism."""
+    solver, most, touched = stretch.solver, stretch.most, stretch.touched
+    is_held = touched is not None and touched.now.holds.any()
+    given = _given(method, of, stretch)
     if method.call.argtypes is None:
         method.call.restype, method.call.argtypes = _WHOLE, [_POINTER] * 4
-    why = method.call(*map(ctypes.addressof, (checks, at, start, records)))
-    take(kept, records)
-    n = kept.made
+    why = method.call(*given.addresses)
+    kept = given.kept
+    take(kept, given.records)
+    n, switched, values = kept.made, given.switched, given.values
     counts = {name: getattr(kept, name) for name in ("derivatives", *method.counts)}
-    counts["switches"] = switches
+    counts["switches"] = given.switches
     if touched:
-        contact_runs.taken(touched, system.kept[-1])
+        contact_runs.taken(touched, given.system.kept[-1])
         counts |= touched.called_by(most)
         if is_held:  # then Jacobians are differences of derivatives
             counts["jacobians"] = np.zeros(most, np.int64)
@@ -120,9 +156,22 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
         why == EVENT,
         switched[:n],
         values[:n],
-        partial(_within, method.between, (solver.t, begun.state), kept) if stretch.dense else None,
-        margins[: n + 1] if held else None,
+        partial(_within, method.between, (solver.t, given.begun.state), kept)
+        if stretch.dense
+        else None,
+        given.margins[: n + 1] if stretch.constrained else None,
     )
+
+
+def rows_of(method: Method, of: Mechanism, run: WholeRun) -> Array | None:
+    """The rows of a run by a method, see `run.compiled.Compiled`."""
+    given = _given(method, of, run.stretch)
+    records: Any = given.records
+    given.kept.rows[0], records.passed = run.stretch.solver.y, 1
+    if method.call.argtypes is None:
+        method.call.restype = _WHOLE
+        method.call.argtypes = [*[_POINTER] * 4, _REAL, _WHOLE]
+    return given.kept.rows if method.call(*given.addresses, run.near, run.most) else None
 
 
 def _records(method: Method, stretch: Stretch) -> tuple[Records, ctypes.Structure]:

@@ -14,8 +14,8 @@ from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of, series_functions
 from eomgen.engine.taylor import HIGHEST, Terms, convolved, expanded, order_of
 from eomgen.native import contact_runs, strides
+from eomgen.native.mechanism import Mechanism, unconstrained
 from eomgen.native.mechanism import context as of_mechanism
-from eomgen.native.mechanism import unconstrained
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import Recurrences
@@ -39,13 +39,16 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
 
     text = series_text(recurrences_of(program, interface), [s.name for s in interface.states])
     by_four = replace(C, listed="*(V *)&{first} = (V){{ {entries} }};")
+    of_contacts = contact_runs.sizes(interface)
+    roots = [*((name, {}) for name in ENGINE), *strides.ROOTS]
+    roots += contact_runs.ROOTS if of_contacts["contacts"] else []
     context = {
         "states": len(interface.states),
         "series": text,
         "orders": HIGHEST + 1,
-        "engine": C.prelude + c_source([*((name, {}) for name in ENGINE), *strides.ROOTS]),
+        "engine": C.prelude + c_source(roots),
         **of_mechanism(),
-        **contact_runs.values(0, 0),
+        **contact_runs.values(**of_contacts),
         "equal": False,
         "adaptive": True,
         "convolved": c_source([("convolved", {})], VECTORS),
@@ -140,10 +143,9 @@ class CompiledTaylor:
         self._series(self._at, t, start.ctypes.data, order, rows.ctypes.data)
         return rows
 
-    def steps(self, stretch: Stretch) -> Stride:
-        """Steps. None are made if they must be checked or keep constraints."""
-        if stretch.watched or stretch.constrained or stretch.touched:
-            stretch = replace(stretch, most=0)
+    def steps(self, stretch: Stretch, of: Mechanism | None = None) -> Stride:
+        """Steps, checked by the functions of a mechanism if they must be."""
+        own = of.having(stages=self._at) if of else self._mechanism
         wide = order_of(stretch.rtol) + 1
         method = strides.Method(self._steps, ("h_abs", "lost"), (), wide, between, follows=True)
-        return strides.steps(method, self._mechanism, stretch)
+        return strides.steps(method, own, stretch)

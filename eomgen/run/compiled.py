@@ -141,6 +141,24 @@ Series = Callable[[float, Array, int], Array]
 """The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
 
 
+@dataclass(frozen=True, eq=False)
+class WholeRun:
+    """A run through all events of rigid contacts of which only rows are wanted.
+
+    stretch  its steps, of which the first row's time is that of the start; `touched` is given
+    near     a row at most so much before a strike, s, is the state after it
+    most     greatest number of steps from one event to the next
+    """
+
+    stretch: Stretch
+    near: float
+    most: int
+
+
+Through = Callable[[WholeRun], Array | None]
+"""Makes a run; its rows, or None if Python must make it."""
+
+
 CALLS = ("derivatives", "gap_checks", "held")
 """What is counted of steps with rigid contacts."""
 
@@ -218,9 +236,11 @@ class Compiled:
                 may begin to compile when the run is a long one
     equal       the same for methods with equal steps, without further functions
     strikes     lets rigid contacts strike; None as for steps
+    through     the runs of a method through all events of rigid contacts; None as for steps
     """
 
     derivative: Callable[[float, Array], Array]
     steps: Callable[[str, tuple[str, ...]], Steps | None]
     equal: Callable[[str], EqualSteps | None]
     strikes: Callable[[], Strikes | None] = lambda: None
+    through: Callable[[str], Through | None] = lambda _: None

@@ -79,21 +79,14 @@ def advances(
     after `max_steps`.
     """
     assert problem.contacts is not None
-    problem = replace(problem, contacts=in_sizes(problem.contacts))
-    contacts = problem.contacts
-    assert contacts is not None
-    closed, opened = np.zeros((2, len(contacts.names)), np.int64)
-    least = 1e-9 * (t_end - t_start)
-    now = Place(t_start, problem.initial, closed, opened, least, t_start, 0)
-    held = nothing_held(contacts, len(problem.initial), rest_speed)
+    contacts = in_sizes(problem.contacts)
+    problem = replace(problem, contacts=contacts)
+    is_begun = resume is not None and "alpha" in resume
+    touched = at_start(problem, (t_start, t_end), rest_speed, anew=not is_begun)
+    made, held, now = 0, touched.now, touched.at
     begun = (now.t, now.y)
-    if resume and "alpha" in resume:
+    if resume and is_begun:
         begun = _resumed(contacts, held, resume)
-    else:
-        begin(contacts, held, now.t, now.y, t_end - t_start)
-        check_depth(contacts, now.t, now.y)
-        now.closed[contacts.gaps(now.t, now.y) <= TOLERANCE] = 1
-    made, touched = 0, Touched(contacts, contacts.names, sizes_of(contacts), held, now, *_NOTHING)
     while True:
         if now.closed.any():
             yield from _strike(problem, touched, stepper.strikes())
@@ -124,6 +117,24 @@ def advances(
             if opens:
                 yield _opened(contacts, smooth, now)
             break
+
+
+def at_start(
+    problem: Problem, span: tuple[float, float], rest_speed: float | None, anew: bool = True
+) -> Touched:
+    """What steps are given of rigid contacts, in sizes, at the start of a run, and `anew` which of
+    them touch. Raises `StepFailure` if one penetrates.
+    """
+    contacts, (t, end) = problem.contacts, span
+    assert contacts is not None
+    closed, opened = np.zeros((2, len(contacts.names)), np.int64)
+    now = Place(t, problem.initial, closed, opened, 1e-9 * (end - t), t, 0)
+    held = nothing_held(contacts, len(problem.initial), rest_speed)
+    if anew:
+        begin(contacts, held, t, now.y, end - t)
+        check_depth(contacts, t, now.y)
+        now.closed[contacts.gaps(t, now.y) <= TOLERANCE] = 1
+    return Touched(contacts, contacts.names, sizes_of(contacts), held, now, *_NOTHING)
 
 
 def _resume(

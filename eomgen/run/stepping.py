@@ -126,7 +126,7 @@ def _equal_steps(
     monitor = StabilityMonitor(change, method.stability) if whole.contacts else None
     unchecked = asked.unstable or asked.repairs or not method.steps_explicitly(whole)
     plain = not (asked.guard or asked.powers)
-    compiled = _compiled(whole) if plain and method.compiled else None
+    compiled = compiled_of(whole) if plain and method.compiled else None
     ahead = plain and not whole.projection
     settings = fixed_step.Settings(
         *(method, change, grid, None if unchecked else whole),
@@ -156,13 +156,8 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
         )
     if method.series:
         check_series(problem, asked.integrator, method.series)
-    times = _spaced(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
-    longest, unseen = longest_steps(asked.max_step, asked.span)
-    if asked.resume is not None and asked.max_step is None:
-        longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
-    atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
-    bounds = Tolerances(asked.rtol, atol, longest, unseen, asked.max_steps)
-    compiled = None if asked.guard else _compiled(problem)
+    times, bounds = times_of(asked), tolerances_of(asked, problem)
+    compiled = None if asked.guard else compiled_of(problem)
     settings = Settings(
         *(method, bounds, asked.t_end, times, remark, compiled.steps if compiled else None),
         each=bool(asked.tally or asked.powers),
@@ -173,11 +168,26 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
         first, last = np.searchsorted(times, (a, b), side="right")
         return cast(list[float], times[first:last].tolist())
 
-    kept = {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
+    limits = numbers(longest=bounds.longest, unseen=bounds.unseen)
+    kept = {**_settings(asked, None), **limits}
     begin = partial(adaptive.advances, settings)
     if compiled and not asked.powers and method.compiled:
         return Steps(begin, rows, kept, compiled.strikes)
     return Steps(begin, rows, kept)
+
+
+def tolerances_of(asked: Asked, problem: Problem) -> Tolerances:
+    """What the steps of an adaptive method may be."""
+    longest, unseen = longest_steps(asked.max_step, asked.span)
+    if asked.resume is not None and asked.max_step is None:
+        longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
+    atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
+    return Tolerances(asked.rtol, atol, longest, unseen, asked.max_steps)
+
+
+def times_of(asked: Asked) -> FloatArray:
+    """The times of the rows of an adaptive method, with that of the start."""
+    return _spaced(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
 
 
 def _spaced(start: float, end: float, count: int) -> FloatArray:
@@ -192,7 +202,7 @@ def _settings(asked: Asked, dt: float | None) -> Resume:
     return numbers(grid=asked.grid, dt=dt, rest_speed=asked.rest_speed, **given)
 
 
-def _compiled(problem: Problem) -> Compiled | None:
+def compiled_of(problem: Problem) -> Compiled | None:
     """The compiled steps of a problem; None if it has none, or another derivative than they."""
     compiled = problem.compiled
     if compiled is None or compiled.derivative is not problem.derivative:

@@ -20,6 +20,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.integrators import find_integrator
 from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.through_events import rows_through_events
 from eomgen.run.trajectory import Trajectory
 from eomgen.store import key_of, this_program
 from eomgen.study.constrained_start import on_constraints
@@ -142,6 +143,7 @@ class _Prepared:
     def __init__(self, task: Task) -> None:
         self.task, self.module = task, module_of(task.source)
         self.times = np.array(task.times)
+        self.asked = {"t_end": task.t_end, "samples": len(task.times), **task.settings}
         self.kept = task.times if len(task.times) > 2 else task.times[-1:]
         self.shapes = [output_shape(task.source, name) for name in task.outputs]
         self.accelerator: Accelerator | None = None
@@ -176,18 +178,16 @@ class _Prepared:
             problem = self._problem(module, given["state"], values, own, notices.append)
             if varying is not None:
                 problem = with_corners(problem, module, values[0], varying)
-            run = self._run(problem)
+            made = self._made(problem)
         except EomgenError as error:
             nothing = np.full((len(self.times), len(self.module.STATES)), np.nan)
             text = " ".join(error.lines)
             return _Member(
                 nothing[0], 0.0, REFUSED, text, nothing, self._outputs(module, nothing, values)
             )
-        rows = self._rows(run)
-        outputs = self._outputs(module, rows, values, own)
-        status = FINISHED if run.finished else STOPPED
-        text = "; ".join([*notices, run.message] if run.message else notices)
-        return _Member(run.y[-1], float(run.t[-1]), status, text, rows, outputs)
+        outputs = self._outputs(module, made.rows, values, own)
+        text = "; ".join(filter(None, [*notices, made.message]))
+        return made._replace(message=text, outputs=outputs)
 
     def _problem(
         self,
@@ -222,12 +222,16 @@ class _Prepared:
             problem = replace(problem, initial=problem.unit(problem.initial))
         return own.of(problem) if own else problem
 
-    def _run(self, problem: Problem) -> Trajectory:
-        task = self.task
-        run = integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
+    def _made(self, problem: Problem) -> _Member:
+        """The run of a problem, without outputs."""
+        found = rows_through_events(problem, **self.asked)
+        if found is not None:
+            return _Member(found[-1], self.task.t_end, FINISHED, "", found, [])
+        run = integrate(problem, **self.asked)
         if run.outcome.kind == "interrupted":  # which is not a result of the member
             raise KeyboardInterrupt
-        return run
+        status = FINISHED if run.finished else STOPPED
+        return _Member(run.y[-1], float(run.t[-1]), status, run.message, self._rows(run), [])
 
     def _rows(self, run: Trajectory) -> FloatArray:
         """The states at the kept times, nan where there is none; the last is that at the end."""

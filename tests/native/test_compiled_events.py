@@ -119,7 +119,13 @@ def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) 
 
 
 @pytest.mark.parametrize(
-    ("method", "rtol"), [("DOP853", 1e-5), ("Rodas5P", 1e-6), *some((), [("DOP853", 1e-10)])]
+    ("method", "rtol"),
+    [
+        ("DOP853", 1e-5),
+        ("Rodas5P", 1e-6),
+        pytest.param("taylor", 1e-6, marks=pytest.mark.every(2)),
+        *some((), [("DOP853", 1e-10)]),
+    ],
 )
 def test_contacts_are_held_in_c(method: str, rtol: float, made: list[int]) -> None:
     """Steps of a block on two feet, on one and on none, and those in which events are."""

@@ -165,7 +165,8 @@ def test_compiled_coefficients() -> None:
     """They have the bits of those in Python."""
     program = everything()
     states = [SimpleNamespace(name=name) for name in STATES]
-    interface: Any = SimpleNamespace(name="everything", states=states, quaternions=())
+    none: Any = {"quaternions": (), "functions": (), "contacts": ()}
+    interface: Any = SimpleNamespace(name="everything", states=states, **none)
     texts = taylor.sources(program, interface)
     library = compiled_library(repr(texts), lambda: texts, taylor.MAIN)
     module: Any = SimpleNamespace(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from falling_block import BLOCK
 from matplotlib.figure import Figure
 
 import eomgen
@@ -24,6 +25,7 @@ from eomgen.native import accelerator
 from eomgen.results import ensemble
 from eomgen.results.design import Law
 from eomgen.results.ensemble import Ensemble
+from eomgen.run.through_events import THROUGH_EVENTS
 from eomgen.show.sweep import draw_sweep
 from eomgen.sweep import execute, members, storage, together
 
@@ -133,6 +135,21 @@ def test_compiled_members_run_in_threads(
     monkeypatch.setattr(execute, "by_processes", pytest.fail)
     monkeypatch.setattr(accelerator, "interfaced_program_of", pytest.fail)
     assert same(one, eomgen.ensemble(scene, vary, workers=2, **asked))
+
+
+@pytest.mark.every(2)
+@COMPILED
+@pytest.mark.parametrize("method", THROUGH_EVENTS)
+def test_compiled_members_go_through_contacts(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By adaptive methods, in threads: strikes, contacts that are held, in C alone, with the bits
+    of single runs. One begins with a strike, at the time of a row.
+    """
+    asked = {"t_end": 1.0, "samples": 9, "integrator": method, "rtol": 1e-6}
+    vary = {"block_y": [0.1, 0.3 * np.sin(0.2)], "lift": [0.0, 8.5]}
+    python = eomgen.ensemble(BLOCK, vary, backend="numpy", **asked)
+    monkeypatch.setattr(members, "integrate", pytest.fail)
+    monkeypatch.setattr(execute, "by_processes", pytest.fail)
+    assert same(python, eomgen.ensemble(BLOCK, vary, workers=2, backend="c", **asked))
 
 
 @pytest.mark.parametrize("asked", [QUICK, pytest.param(TOGETHER, marks=COMPILED)])

@@ -18,7 +18,7 @@ from eomgen.run.integrators.stepper import Settings, Stepper
 from eomgen.run.integrators.strides import Strides
 from eomgen.run.problem import Problem
 
-_CHECK_STIFFNESS, _MANY_MORE = 10_000, 20
+CHECK_STIFFNESS, _MANY_MORE = 10_000, 20
 """After this many steps, an explicit method that needs `_MANY_MORE` times as many is checked for
 stiffness."""
 _CHECK_PACE = 100_000
@@ -56,7 +56,7 @@ def advances(
     left, here = bounds.most - made, 0
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
-        most = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here) - here
+        most = min(m for m in (left, CHECK_STIFFNESS, _CHECK_PACE) if m > here) - here
         most = min(most, stepper.shaken.left) if stepper.shaken else most
         portion = (compiled.made(most) if compiled else None) or stepper.made()
         if portion is None:  # the step must be repeated
@@ -80,7 +80,7 @@ def _check_pace(problem: Problem, stepper: Stepper, t_start: float, here: int, l
             f"{left} steps",
             f"take a shorter --t-end, or {method.remedy}",
         )
-    if here == _CHECK_STIFFNESS and not method.uses_jacobian and method.one_step:
+    if here == CHECK_STIFFNESS and not method.uses_jacobian and method.one_step:
         _check_stiff(problem, solver, (t_start, t_end), here)
 
 
