@@ -17,6 +17,7 @@ from eomgen.base.errors import RunError, listed, nearest
 from eomgen.base.options import taking
 from eomgen.fitting.columns import Columns, sorted_columns
 from eomgen.fitting.estimate import Estimate, Residuals, Sought, Weighed, estimated, told
+from eomgen.fitting.inertias import chart
 from eomgen.fitting.logs import Data, Log, read_log
 from eomgen.fitting.motion import Motion, Samples
 from eomgen.model.model import Model
@@ -158,8 +159,12 @@ class _Fitting:
             if not deviation > 0:
                 raise RunError(f"{reporter.argument('priors')}: the deviation of {name} is not > 0")
         within = np.array([_of(bounds, name, (-np.inf, np.inf)) for name in names])
+        coordinates = chart(
+            self._task.model, names, np.array(start), np.isfinite(within).any(axis=1)
+        )
         known = np.array([_of(priors, name, (0.0, np.inf)) for name in names])
-        return Sought(np.array(start, dtype=float), *within.T, *known.T)
+        low, high, mean, sigma = *within.T, *known.T
+        return Sought(np.array(start, dtype=float), low, high, mean, sigma, coordinates)
 
     def _first(self, number: int, state: int) -> float:
         """The value of an initial state with which the search begins: as given; else the first

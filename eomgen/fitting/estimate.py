@@ -7,12 +7,13 @@ Intervals are those of the linearised model: Seber and Wild, Nonlinear Regressio
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from eomgen.base.errors import RunError
+from eomgen.fitting.inertias import Chart
 from eomgen.run.problem import FloatArray
 
 CERTAIN = 0.95
@@ -51,6 +52,7 @@ class Sought:
     start       (n,) where the search begins
     low, high   (n,) bounds
     mean, sigma (n,) of priors; sigma is inf without one
+    chart       coordinates in which is searched
     """
 
     start: FloatArray
@@ -58,6 +60,7 @@ class Sought:
     high: FloatArray
     mean: FloatArray
     sigma: FloatArray
+    chart: Chart = field(default_factory=Chart)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,15 +175,16 @@ def _fitted(
     def whole(values: FloatArray) -> Residuals:
         return _whole(calls.at(values), sought, noise, values)
 
-    def residuals(values: FloatArray) -> FloatArray:
-        return whole(values).values
+    def residuals(coordinates: FloatArray) -> FloatArray:
+        return whole(sought.chart.outward(coordinates)[0]).values
 
-    def slopes(values: FloatArray) -> FloatArray:
-        return whole(values).slopes
+    def slopes(coordinates: FloatArray) -> FloatArray:
+        values, by = sought.chart.outward(coordinates)
+        return np.asarray(whole(values).slopes @ by)
 
     found = least_squares(
         residuals,
-        np.clip(start, sought.low, sought.high),
+        sought.chart.inward(np.clip(start, sought.low, sought.high)),
         slopes,
         bounds=(sought.low, sought.high),
         x_scale="jac",
@@ -189,9 +193,10 @@ def _fitted(
         gtol=TOLERANCE,
         max_nfev=MOST,
     )
+    values = sought.chart.outward(found.x)[0]
     if found.status == 0:
-        return found.x, f"the search has not converged after {MOST} motions"
-    return found.x, REFUSED if calls.refused else ""
+        return values, f"the search has not converged after {MOST} motions"
+    return values, REFUSED if calls.refused else ""
 
 
 def _deviations(found: Residuals, sought: Sought, noise: FloatArray, groups: Any) -> FloatArray:
