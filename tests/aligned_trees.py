@@ -9,10 +9,11 @@ and d'Alembert, with dense elimination.
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import gmpy2
+import numpy as np
 from gmpy2 import mpfr
 
 BITS = 340
@@ -20,8 +21,9 @@ BITS = 340
 NOTHING = 1e-60
 """What is left by them of an acceleration that is 0."""
 HALF_AN_ULP = 2.0**-53
-Vector = list[Any]
-Matrix = list[Vector]
+Vector = np.ndarray
+Matrix = np.ndarray
+"""Of numbers like these."""
 Near = Callable[[float], Any]
 """A number as it is, or changed by up to half a unit in the last place."""
 
@@ -330,8 +332,8 @@ class _Frame:
     w: Vector
     alpha: Vector
     a: Vector
-    turn: list[Vector]
-    move: list[Vector]
+    turn: Matrix
+    move: Matrix
 
 
 @dataclass
@@ -344,10 +346,9 @@ class _Solver:
         c = self.given
         nv = len(c.v)
         q, v = [self.near(x) for x in c.q], [self.near(x) for x in c.v]
-        M = [[mpfr(0)] * nv for _ in range(nv)]
-        right = [mpfr(0)] * nv
+        M, right = np.full((nv, nv), mpfr(0)), np.full(nv, mpfr(0))
         down = self._unit(c.down) if c.down is not None else _vector(c.dimensions - 1, -1)
-        g = [self.near(c.g) * x for x in down]
+        g = self.near(c.g) * down
         i = j = 0
         for link in c.links:
             frame = self._at(link.parent, nv)
@@ -355,57 +356,47 @@ class _Solver:
             self.frames.append(frame)
             mass = self.near(link.mass)
             inertia = self._inertia(link, frame)
-            L = _times(inertia, frame.w)
-            torque = _sum(_times(inertia, frame.alpha), _cross(frame.w, L))
-            force = [mass * (a - b) for a, b in zip(frame.a, g, strict=True)]
-            for p in range(nv):
-                right[p] -= _dot(frame.move[p], force) + _dot(frame.turn[p], torque)
-                spun = _times(inertia, frame.turn[p])
-                for s in range(nv):
-                    M[p][s] += mass * _dot(frame.move[p], frame.move[s])
-                    M[p][s] += _dot(frame.turn[s], spun)
+            torque = inertia @ frame.alpha + np.cross(frame.w, inertia @ frame.w)
+            force = mass * (frame.a - g)
+            right -= frame.move @ force + frame.turn @ torque
+            M += mass * frame.move @ frame.move.T + frame.turn @ inertia @ frame.turn.T
             if link.rotor and link.held is None:
-                M[j - 1][j - 1] += self.near(link.rotor)
+                M[j - 1, j - 1] += self.near(link.rotor)
             if _sprung(link):
                 stiffness, rest = map(self.near, _spring(link))
                 right[j - 1] -= stiffness * (q[i - 1] - rest)
         if c.force is not None:
             body = self.frames[-1]
             push = self._space(c.force)
-            push = _times(body.R, push) if c.force_axes == "body" else push
-            at = _times(body.R, self._space(c.pushed))
-            for p in range(nv):
-                reach = _cross(body.turn[p], at)
-                right[p] += _dot(_sum(body.move[p], reach), push)
+            push = body.R @ push if c.force_axes == "body" else push
+            at = body.R @ self._space(c.pushed)
+            right += (body.move + np.cross(body.turn, at)) @ push
         return _solved(M, right)
 
     def _space(self, vector: Sequence[float]) -> Vector:
-        return [*map(self.near, vector), mpfr(0)][:3]
+        return np.array([*map(self.near, vector), mpfr(0)][:3])
 
     def _unit(self, vector: Sequence[float]) -> Vector:
         x = self._space(vector)
-        length = gmpy2.sqrt(_dot(x, x))
-        return [part / length for part in x]
+        return x / gmpy2.sqrt(x @ x)
 
     def _at(self, parent: int, nv: int) -> _Frame:
         if parent >= 0:
             return self.frames[parent]
-        nothing = [mpfr(0)] * 3
-        eye = [_vector(k) for k in range(3)]
-        return _Frame(eye, nothing, nothing, nothing, [nothing] * nv, [nothing] * nv)
+        nothing, none = np.full(3, mpfr(0)), np.full((nv, 3), mpfr(0))
+        return _Frame(_eye(), nothing, nothing, nothing, none, none)
 
     def _inertia(self, link: Link, frame: _Frame) -> Matrix:
         xx, yy, zz, xy, xz, yz = map(self.near, link.inertia)
-        own = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
-        half = [_times(frame.R, row) for row in own]  # own Rᵀ, by rows of own
-        return _transposed([_times(frame.R, column) for column in _transposed(half)])
+        own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return frame.R @ own @ frame.R.T
 
     def _held(
         self, link: Link, frame: _Frame, q: Vector, v: Vector, i: int, j: int
     ) -> tuple[_Frame, int, int]:
         """A body's frame, and how many coordinates and velocities there are up to it."""
         if link.kind != "free":
-            frame = _moved(frame, _times(frame.R, self._space(link.r_parent)))
+            frame = _moved(frame, frame.R @ self._space(link.r_parent))
             frame = _turned(frame, self._orientation(link.orientation))
         for end in self._moves(link):
             if end == "spin":
@@ -414,8 +405,7 @@ class _Solver:
             elif end.startswith("slide"):
                 axis = self._axis(link, end)
                 if link.held is not None:
-                    way = self.near(link.held)
-                    frame = _moved(frame, [way * x for x in _times(frame.R, axis)])
+                    frame = _moved(frame, self.near(link.held) * (frame.R @ axis))
                     continue
                 frame = _slid(frame, axis, q[i], v[j], j)
                 i, j = i + 1, j + 1
@@ -429,7 +419,7 @@ class _Solver:
                 # An axis that stands askew is used twice: to get to it, and back.
                 frame = _turned(frame, _between(axis, self._axis(link, end)))
         if link.kind != "free":
-            frame = _moved(frame, [-x for x in _times(frame.R, self._space(link.r_child))])
+            frame = _moved(frame, -(frame.R @ self._space(link.r_child)))
         return frame, i, j
 
     def _moves(self, link: Link) -> Iterator[str]:
@@ -460,38 +450,18 @@ class _Solver:
         return (mpfr(degrees) if whole else self.near(degrees)) * gmpy2.const_pi() / 180
 
     def _orientation(self, degrees: Sequence[float]) -> Matrix:
-        turned = [_vector(k) for k in range(3)]
+        turned = _eye()
         for k, angle in enumerate(degrees):
-            turned = _product(_about(_vector(k), self._radians(angle)), turned)
+            turned = _about(_vector(k), self._radians(angle)) @ turned
         return turned
 
 
 def _vector(k: int, size: int = 1) -> Vector:
-    return [mpfr(size if k == i else 0) for i in range(3)]
+    return np.array([mpfr(size if k == i else 0) for i in range(3)])
 
 
-def _sum(*vectors: Vector) -> Vector:
-    return [sum(parts) for parts in zip(*vectors, strict=True)]
-
-
-def _dot(a: Vector, b: Vector) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _times(m: Matrix, a: Vector) -> Vector:
-    return [_dot(row, a) for row in m]
-
-
-def _transposed(m: Matrix) -> Matrix:
-    return [list(column) for column in zip(*m, strict=True)]
-
-
-def _product(a: Matrix, b: Matrix) -> Matrix:
-    return _transposed([_times(a, column) for column in _transposed(b)])
+def _eye() -> Matrix:
+    return np.array([_vector(k) for k in range(3)])
 
 
 def _about(axis: Vector, angle: Any) -> Matrix:
@@ -500,74 +470,63 @@ def _about(axis: Vector, angle: Any) -> Matrix:
 
 
 def _rotation(n: Vector, c: Any, s: Any) -> Matrix:
-    cross = [[mpfr(0), -n[2], n[1]], [n[2], mpfr(0), -n[0]], [-n[1], n[0], mpfr(0)]]
-    return [
-        [n[i] * n[j] * (1 - c) + s * cross[i][j] + (c if i == j else 0) for j in range(3)]
-        for i in range(3)
-    ]
+    return np.outer(n, n) * (1 - c) + s * np.cross(n, _eye()).T + c * _eye()
 
 
 def _between(a: Vector, b: Vector) -> Matrix:
     """From the coordinate axis nearest to both to a, and back from b."""
     k = _main(a)
     e = _vector(k, 1 if a[k] > 0 else -1)
-    return _product(_shortest(e, a), _transposed(_shortest(e, b)))
+    return _shortest(e, a) @ _shortest(e, b).T
 
 
 def _shortest(a: Vector, b: Vector) -> Matrix:
     """The shortest turn between two unit vectors."""
-    n = _cross(a, b)
-    s = gmpy2.sqrt(_dot(n, n))
-    if not s:
-        return [_vector(k) for k in range(3)]
-    return _rotation([x / s for x in n], _dot(a, b), s)
+    n = np.cross(a, b)
+    s = gmpy2.sqrt(n @ n)
+    return _rotation(n / s, a @ b, s) if s else _eye()
 
 
 def _moved(f: _Frame, d: Vector) -> _Frame:
     """The origin moved by a vector, world axes, that is fixed in the frame."""
-    move = [_sum(move, _cross(turn, d)) for move, turn in zip(f.move, f.turn, strict=True)]
-    a = _sum(f.a, _cross(f.alpha, d), _cross(f.w, _cross(f.w, d)))
-    return _Frame(f.R, f.w, f.alpha, a, f.turn, move)
+    a = f.a + np.cross(f.alpha, d) + np.cross(f.w, np.cross(f.w, d))
+    return replace(f, a=a, move=f.move + np.cross(f.turn, d))
 
 
 def _turned(f: _Frame, fixed: Matrix) -> _Frame:
-    return _Frame(_product(f.R, fixed), f.w, f.alpha, f.a, f.turn, f.move)
+    return replace(f, R=f.R @ fixed)
 
 
 def _slid(f: _Frame, axis: Vector, way: Any, rate: Any, j: int) -> _Frame:
-    n = _times(f.R, axis)
-    f = _moved(f, [way * x for x in n])
-    move = list(f.move)
-    move[j] = _sum(move[j], n)
-    a = _sum(f.a, [2 * rate * x for x in _cross(f.w, n)])
-    return _Frame(f.R, f.w, f.alpha, a, f.turn, move)
+    n = f.R @ axis
+    f = _moved(f, way * n)
+    move = f.move.copy()
+    move[j] += n
+    return replace(f, a=f.a + 2 * rate * np.cross(f.w, n), move=move)
 
 
 def _turning(f: _Frame, axis: Vector, angle: Any, rate: Any, j: int) -> _Frame:
-    n = _times(f.R, axis)
-    own = [rate * x for x in n]
-    turn = list(f.turn)
-    turn[j] = _sum(turn[j], n)
-    alpha, w = _sum(f.alpha, _cross(f.w, own)), _sum(f.w, own)
-    return _Frame(_product(f.R, _about(axis, angle)), w, alpha, f.a, turn, f.move)
+    n = f.R @ axis
+    turn = f.turn.copy()
+    turn[j] += n
+    return _whirled(replace(f, R=f.R @ _about(axis, angle), turn=turn), rate * n)
+
+
+def _whirled(f: _Frame, own: Vector) -> _Frame:
+    """With an angular velocity of its own."""
+    return replace(f, alpha=f.alpha + np.cross(f.w, own), w=f.w + own)
 
 
 def _spun(f: _Frame, quaternion: Vector, spin: Vector, j: int) -> _Frame:
     """Turned by a quaternion of any length, at angular velocity `spin` in the turned axes."""
     length = gmpy2.sqrt(sum(x * x for x in quaternion))
-    w, *v = [x / length for x in quaternion]
-    sine = gmpy2.sqrt(_dot(v, v))
-    turned = [_vector(k) for k in range(3)]
-    if sine:
-        axis = [x / sine for x in v]
-        turned = _rotation(axis, w * w - sine * sine, 2 * w * sine)
-    R = _product(f.R, turned)
-    own = _times(R, spin)
-    turn = list(f.turn)
-    for k, n in enumerate(_transposed(R)):
-        turn[j + k] = _sum(turn[j + k], n)
-    alpha = _sum(f.alpha, _cross(f.w, own))
-    return _Frame(R, _sum(f.w, own), alpha, f.a, turn, f.move)
+    w, *rest = [x / length for x in quaternion]
+    v = np.array(rest)
+    sine = gmpy2.sqrt(v @ v)
+    R = f.R @ _rotation(v / sine, w * w - sine * sine, 2 * w * sine) if sine else f.R
+    turn = f.turn.copy()
+    turn[j : j + 3] += R.T
+    return _whirled(replace(f, R=R, turn=turn), R @ np.array(spin))
 
 
 def _solved(matrix: Matrix, right: Vector) -> Vector:

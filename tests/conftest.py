@@ -121,10 +121,11 @@ def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _in_short() -> Iterator[None]:
-    """Calls and runs are timed as seldom as may be: no test asks how long something took. And C is
+    """Calls and runs are timed as seldom as may be: no test asks how long something took. C is
     compiled without optimisation, which takes a third of the time and changes no bit: tests with
-    the fixture `optimised` show that.
+    the fixture `optimised` show that. And the parser of the command line is made once.
     """
+    from eomgen.commands.main import parsers
 
     compile_c = _compile_c()
 
@@ -136,6 +137,7 @@ def _in_short() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("eomgen.native.compiler.Compiler.shared_library", plainly)
+        patch.setattr("eomgen.commands.main.parsers", cache(parsers))
         patch.setattr("eomgen.study.timing.TIMING", 0.0)
         patch.setattr("eomgen.study.accuracy.work_precision.REPEATS", 0.0)
         yield

@@ -1,7 +1,7 @@
 """Small scenes as text: effects, and bodies for them to act on."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
@@ -76,10 +76,10 @@ def lone(joint: str, /, *tables: str, body: str = "b", on: str = "j", **keys: An
     return lines(top) + "".join(tables)
 
 
-def refusal(scene: str) -> str:
-    """The one line that a scene is refused with."""
+def refusal(scene: str | Callable[[], object]) -> str:
+    """The one line that a scene is refused with, or what is done with one."""
     with pytest.raises(SceneError) as error:
-        elaborate(parse_scene(scene))
+        elaborate(parse_scene(scene)) if isinstance(scene, str) else scene()
     message = str(error.value).removeprefix("scene: ")
     assert "\n" not in message and message.isprintable(), message
     return message

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from scenes import effect, lone
 
 import eomgen
 from eomgen.commands import durations, generating
@@ -191,23 +192,17 @@ def test_an_interrupt_says_what_is_kept(
     assert "interrupted; what was derived is kept" in capsys.readouterr().err
 
 
-DASHED = """\
-name = "dashed"
-inputs = ["wind-speed"]
-parameters = { arm-1 = 2.0 }
-definitions = { half = "arm_1/2" }
-bodies = [{ name = "left-arm", mass = "half", inertia_com = 0.1 }]
-[[joints]]
-name = "left-pin"
-type = "revolute"
-parent = "world"
-child = "left-arm"
-[[effects]]
-type = "motor"
-name = "drive"
-joint = "left-pin"
-torque = "wind_speed - left_pin_angle"
-"""
+DASHED = lone(
+    "revolute",
+    effect("motor", name="drive", joint="left-pin", torque="wind_speed - left_pin_angle"),
+    body="left-arm",
+    on="left-pin",
+    name="dashed",
+    inputs=["wind-speed"],
+    parameters={"arm-1": 2.0},
+    definitions={"half": "arm_1/2"},
+    mass="half",
+)
 
 
 def test_a_name_is_taken_with_either_sign(
@@ -222,7 +217,8 @@ def test_a_name_is_taken_with_either_sign(
         t_end=0.1,
     )
     assert run["left-pin_angle"].tolist() == run["left_pin_angle"].tolist() != []
-    found = eomgen.ensemble(DASHED, eomgen.grid({"arm-1": [1, 2], "wind-speed": [0, 1]}), t_end=0.1)
+    members = eomgen.grid({"arm-1": [1, 2], "wind-speed": [0, 1]})
+    found = eomgen.ensemble(DASHED, members, t_end=0.1, workers=1)
     assert found.of("arm-1").tolist() == found.of("arm_1").tolist() == [1, 1, 2, 2]
     assert found.statistics("left-pin_angle").mean.tolist() == [
         found.of("left_pin_angle").mean().tolist()
@@ -234,7 +230,7 @@ def test_a_name_is_taken_with_either_sign(
     file = tmp_path / "dashed.toml"
     file.write_text(DASHED)
     command = ["sweep", str(file), "--vary", "arm-1=1,2", "--of", "left-pin_angle", "-o"]
-    assert main([*command, str(tmp_path / "out"), "--t-end", "0.1"]) == 0
+    assert main([*command, str(tmp_path / "out"), "--t-end", "0.1", "--workers", "1"]) == 0
     assert "left_pin_angle at the end" in capsys.readouterr().out
     hint = r"did you mean '{}'\? In formulas - subtracts"
     for text, name in (

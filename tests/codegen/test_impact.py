@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from engine import MP, Engine, along, exact
+from scenes import WEIGHT, effect
 from striking import MATERIAL, Balls, Limit, dense_impact, normals, striking, touching_velocities
 
 FREE = """\
@@ -32,11 +33,7 @@ child = "{0}"
 r_parent = {5}
 r_child = {6}
 """
-GRAVITY = """\
-[[effects]]
-type = "gravity"
-g = 9.81
-"""
+GRAVITY = WEIGHT
 RADIUS, MASS, INERTIA = 0.2, 2.0, 0.032
 DISC = 'name = "disc"\n' + MATERIAL + FREE.format("ball", MASS, INERTIA) + GRAVITY
 BALL = 'name = "ball"\ndimensions = 3\n' + MATERIAL
@@ -276,14 +273,14 @@ def test_no_input_makes_what_is_no_number() -> None:
     hanging = Balls(normal=(0.0, 1.0), on_plane=(("upper", (0, 0), 0.1), ("lower", (0, 0), 0.1)))
     models = [*MODELS.values(), (TWIN, hanging), (flat, FLOOR_2)]
     models += [(wire, FLOOR_3.replaced(turned=turn)) for turn in (0.0, 1.0)]
-    for scene, effect in models:
-        engine = striking(scene, effect)
+    for scene, acting in models:
+        engine = striking(scene, acting)
         for size in (0.0, 1e-200, 1e6, 1e100):
             for mu in (0.0, 1e-12, 1e12):
                 y = engine.module.initial_state()
                 ways = rng.integers(-1, 2, size=len(engine.model.velocities))
                 y[len(engine.model.coordinates) :] = size * ways
-                y[: len(engine.model.coordinates)] += 0.0 if effect is not SLOPE else 1e-3
+                y[: len(engine.model.coordinates)] += 0.0 if acting is not SLOPE else 1e-3
                 forces = np.full(len(engine.module.CONTACTS), 2.0)
                 with suppress(FloatingPointError) if size > 1e20 else nullcontext():
                     for k in range(len(engine.module.CONTACTS)):
@@ -374,21 +371,15 @@ def test_a_stop_strikes() -> None:
 
 def test_time_inputs_and_states_of_effects() -> None:
     """Contacts beside what commands; states of effects go through an impact as they are."""
-    drive = """
-[[effects]]
-type = "pid"
-name = "drive"
-joint = "upper_hinge"
-target = "0.3*sin(2*t)"
-stiffness = 4.0
-integral_gain = 2.0
-lag = 0.1
-[[effects]]
-type = "motor"
-name = "push"
-joint = "lower_hinge"
-torque = "input"
-"""
+    drive = effect(
+        "pid",
+        name="drive",
+        joint="upper_hinge",
+        target="0.3*sin(2*t)",
+        stiffness=4.0,
+        integral_gain=2.0,
+        lag=0.1,
+    ) + effect("motor", name="push", joint="lower_hinge", torque="input")
     rocking = Limit(joint="lower_hinge", high=0.3, weight="1 + sin(3*t)/2")
     engine = striking(TWIN + drive, WALL, rocking)
     module, t, u = engine.module, 0.7, {"push": 2.0}

@@ -85,6 +85,20 @@ def unit(folder: Path, scene: str) -> Path:
     return eomgen.export(scene, "fmu", path)[0]
 
 
+def stepped(path: Path, run: Any) -> list[float]:
+    """The last state of a unit in co-simulation, at the end of a run."""
+    t_end = run.t[-1]
+    found = simulate_fmu(
+        str(path),
+        fmi_type="CoSimulation",
+        stop_time=t_end,
+        output_interval=t_end / 4,
+        relative_tolerance=1e-12,
+        output=list(run.states),
+    )
+    return [found[name][-1] for name in run.states]
+
+
 @pytest.mark.every(2)
 @pytest.mark.parametrize(("scene", "t_end"), RUNS)
 def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> None:
@@ -94,16 +108,7 @@ def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> 
     run = eomgen.simulate(scene, t_end=t_end, rtol=1e-12, atol=1e-14, samples=2)
     assert run.finished
     assert (t_end == 1.6) == any(event.kind == "rest" for event in run.trajectory.events)
-    found = simulate_fmu(
-        str(path),
-        fmi_type="CoSimulation",
-        stop_time=t_end,
-        output_interval=t_end / 4,
-        relative_tolerance=1e-12,
-        output=list(run.states),
-    )
-    stepped = [found[name][-1] for name in run.states]
-    np.testing.assert_allclose(stepped, run.y[-1], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(stepped(path, run), run.y[-1], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(exchanged(path, t_end), run.y[-1], rtol=1e-8, atol=1e-8)
 
 
@@ -126,19 +131,10 @@ def test_each_method_moves_as_our_own_run(scene: str, method: str, tmp_path: Pat
     own: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14} if adapts else unstable
     run = eomgen.simulate(source, t_end=t_end, samples=2, integrator=method, backend="numpy", **own)
     assert run.finished
-    found = simulate_fmu(
-        str(path),
-        fmi_type="CoSimulation",
-        stop_time=t_end,
-        output_interval=t_end / 4,
-        relative_tolerance=1e-12,
-        output=list(run.states),
-    )
-    stepped = [found[name][-1] for name in run.states]
     if adapts:
-        np.testing.assert_allclose(stepped, run.y[-1], rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(stepped(path, run), run.y[-1], rtol=1e-8, atol=1e-8)
     else:
-        assert stepped == run.y[-1].tolist()
+        assert stepped(path, run) == run.y[-1].tolist()
 
 
 CAM = """
@@ -185,8 +181,8 @@ def test_the_units_own_solver_of_an_importer_agrees(folder: Path) -> None:
         relative_tolerance=1e-11,
         output=list(run.states),
     )
-    stepped = [found[name][-1] for name in run.states]
-    np.testing.assert_allclose(stepped, run.y[-1], rtol=1e-8, atol=1e-8)
+    last = [found[name][-1] for name in run.states]
+    np.testing.assert_allclose(last, run.y[-1], rtol=1e-8, atol=1e-8)
 
 
 def test_values_and_directional_derivatives_are_those_of_the_module(folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import WEIGHT, effect, lone
 from test_lanes import WIDTHS, members
 
 import eomgen
@@ -175,27 +176,18 @@ def test_default_tolerances_are_those_of_a_single_run(
         assert np.allclose(found, expected, rtol=1e-12, atol=0)
 
 
-STEEP = """
-name = "steep"
-bodies = [{ name = "bob", mass = 1.0, inertia_com = 0 }]
-initial = { q = { theta = -1.4 } }
-[[joints]]
-name = "pivot"
-type = "revolute"
-parent = "world"
-child = "bob"
-r_child = [-1.0, 0]
-coordinate = "theta"
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "field"
-name = "push"
-kind = "formula"
-body = "bob"
-force = ["1/(1 + exp(900*x))", 0]
-"""
+STEEP = lone(
+    "revolute",
+    WEIGHT,
+    effect("field", name="push", kind="formula", body="bob", force=["1/(1 + exp(900*x))", 0]),
+    body="bob",
+    on="pivot",
+    name="steep",
+    initial={"q": {"theta": -1.4}},
+    inertia_com=0,
+    r_child=[-1.0, 0],
+    coordinate="theta",
+)
 """A pendulum with a force that overflows beyond x = 0.79 m, although it is finite there."""
 
 

@@ -11,6 +11,7 @@ import pytest
 from campaign import FULL, some
 from crank_rocker import STOPPED
 from falling_block import BLOCK
+from scenes import WEIGHT, effect, lone
 from scipy.optimize import brentq
 from test_compiled_runs import EXPLICIT, assert_same, both, compiler
 
@@ -28,29 +29,25 @@ SCENES = some(("bouncing_two_body",), ("bouncing_two_body", *built_in_names()))
 ENDS = {"ragdoll": 1.0, "walker_motors": 0.5, "stiff_beam": 0.2}
 WATCHED = ("bicycle",)
 """Whose constraints are so near to being singular that Python looks at each step."""
-WHEEL = """
-name = "wheel"
-parameters = { a = 1.0, w = 0.1, k = 400.0, s = 1.0, m = 0.0, u = 1.0, f = 3.0 }
-bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
-joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
-initial = { q = { q = 0.3 }, v = { q_dot = 3.0 } }
-simulation = { integrator = "DOP853", rtol = 1e-8, t_end = 3.0 }
-[[effects]]
-type = "motor"
-name = "pulse"
-joint = "axle"
-torque = "5*step(t - a)*step(a + w - t)"
-[[effects]]
-type = "motor"
-name = "stops"
-joint = "axle"
-torque = "-s*k*max(0, q - 1) + s*k*max(0, -1 - q) - s*0.4*step(q_dot)*max(0, q - 1)"
-[[effects]]
-type = "motor"
-name = "brush"
-joint = "axle"
-torque = "m*step(sin(u*q - f*t) - 0.95)"
-"""
+WHEEL = lone(
+    "revolute",
+    effect("motor", name="pulse", joint="axle", torque="5*step(t - a)*step(a + w - t)"),
+    effect(
+        "motor",
+        name="stops",
+        joint="axle",
+        torque="-s*k*max(0, q - 1) + s*k*max(0, -1 - q) - s*0.4*step(q_dot)*max(0, q - 1)",
+    ),
+    effect("motor", name="brush", joint="axle", torque="m*step(sin(u*q - f*t) - 0.95)"),
+    body="disc",
+    on="axle",
+    name="wheel",
+    parameters={"a": 1.0, "w": 0.1, "k": 400.0, "s": 1.0, "m": 0.0, "u": 1.0, "f": 3.0},
+    initial={"q": {"q": 0.3}, "v": {"q_dot": 3.0}},
+    simulation={"integrator": "DOP853", "rtol": 1e-08, "t_end": 3.0},
+    inertia_com=0.4,
+    coordinate="q",
+)
 """A wheel between springy stops, with a pulse in time."""
 TURNING = WHEEL.replace("s = 1.0, m = 0.0", "s = 0.0, m = 2.0").replace(
     "q_dot = 3.0", "q_dot = 40.0"
@@ -60,30 +57,19 @@ STILL = WHEEL.replace("q_dot = 3.0", "q_dot = 1e-3").replace(
     "u = 1.0, f = 3.0", "u = 1e-6, f = 62.83185307179586"
 )
 """The wheel hardly turns. The brush is there in each period of 0.1 s, and has no force."""
-HELD = """
-name = "block"
-dimensions = 2
-parameters = { push = 8.0 }
-bodies = [{ name = "block", mass = 1.0, inertia_com = 0.1 }]
-points = [{ name = "foot", body = "block", at = [0.3, 0.0] }]
-joints = [{ name = "flight", type = "free", child = "block" }]
-initial = { q = { block_y = 0.7 }, v = { block_angle_dot = 25.0 } }
-simulation = { t_end = 3.0 }
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "external_force"
-name = "lift"
-body = "block"
-force = [1, "push*max(0, sin(3*t))"]
-[[effects]]
-type = "contact"
-name = "floor"
-law = "impact"
-points = ["foot"]
-restitution = 0.6
-"""
+HELD = lone(
+    "free",
+    WEIGHT,
+    effect("external_force", name="lift", body="block", force=[1, "push*max(0, sin(3*t))"]),
+    effect("contact", name="floor", law="impact", points=["foot"], restitution=0.6),
+    body="block",
+    on="flight",
+    name="block",
+    parameters={"push": 8.0},
+    points=[{"name": "foot", "body": "block", "at": [0.3, 0.0]}],
+    initial={"q": {"block_y": 0.7}, "v": {"block_angle_dot": 25.0}},
+    simulation={"t_end": 3.0},
+)
 
 pytestmark = compiler
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bookkeeping import light
 from engine import read, text_of
+from scenes import WEIGHT, effect, lone
 
 from eomgen.commands.main import main
 from eomgen.run.archive import checked, packed, unpacked
@@ -19,16 +20,9 @@ from eomgen.run.trajectory import Trajectory, load_npz
 from eomgen.study.verification.truth import Truth
 
 DIGITS = np.finfo(float).eps / 2
-PENDULUM = """
-name = "swing"
-route = "aba"
-bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]
-joints = [{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, 1] }]
-initial = { q = { j_angle = 1.0 } }
-[[effects]]
-type = "gravity"
-g = 9.81
-"""
+PENDULUM = lone(
+    "revolute", WEIGHT, name="swing", route="aba", initial={"q": {"j_angle": 1.0}}, r_child=[0, 1]
+)
 
 
 @cache
@@ -236,21 +230,8 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "give a run of this scene" in capsys.readouterr().err
 
 
-DRIVEN = f"""{PENDULUM}
-[[effects]]
-type = "motor"
-name = "drive"
-joint = "j"
-torque = "input"
-"""
-SPRUNG = f"""{DRIVEN}
-[[effects]]
-type = "joint_spring"
-name = "coil"
-joint = "j"
-stiffness = 1
-damping = 0
-"""
+DRIVEN = PENDULUM + effect("motor", name="drive", joint="j", torque="input")
+SPRUNG = DRIVEN + effect("joint_spring", name="coil", joint="j", stiffness=1, damping=0)
 
 
 @pytest.mark.usefixtures("blank_figures")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bookkeeping import light
+from scenes import WEIGHT, effect, lone
 
 import eomgen
 from eomgen.base.errors import RunError
@@ -18,33 +19,18 @@ from eomgen.run.problem import Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.reader import parse_scene
 
-SLIDE = """
-name = "slide"
-bodies = [{ name = "b", mass = 1.0, inertia_com = 0 }]
-joints = [{ name = "j", type = "prismatic", parent = "world", child = "b", axis = [0, 1] }]
-"""
-SPRING = f"""{SLIDE}
-initial = {{ q = {{ j_slide = 0.1 }}, v = {{ j_slide_dot = 1.0 }} }}
-[[effects]]
-type = "joint_spring"
-name = "spring"
-joint = "j"
-stiffness = 1e12
-damping = 0
-"""
-WALL = f"""{SLIDE}
-initial = {{ q = {{ j_slide = 0.5 }} }}
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "contact"
-name = "floor"
-law = "hunt_crossley"
-body = "b"
-stiffness = 1e9
-dissipation = 0.0
-"""
+SLIDE = lone("prismatic", name="slide", inertia_com=0, axis=[0, 1])
+SPRING = lone(
+    "prismatic",
+    effect("joint_spring", joint="j", stiffness=1e12, damping=0),
+    inertia_com=0, axis=[0, 1], initial={"q": {"j_slide": 0.1}, "v": {"j_slide_dot": 1.0}},
+)  # fmt: skip
+WALL = lone(
+    "prismatic",
+    WEIGHT,
+    effect("contact", law="hunt_crossley", body="b", stiffness=1e9, dissipation=0.0),
+    inertia_com=0, axis=[0, 1], initial={"q": {"j_slide": 0.5}},
+)  # fmt: skip
 SERVO = """
 name = "servo"
 bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import some
+from scenes import effect, lone
 from scipy.integrate import solve_ivp
 
 import eomgen
@@ -15,24 +16,20 @@ from eomgen.run.inputs import Table
 from eomgen.run.intervals import Interval
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-CART = """\
-name = "cart"
-inputs = ["thrust", { name = "wind", unit = "N", about = "side wind" }]
-parameters = { m = 2.0 }
-bodies = [{ name = "block", mass = "m", inertia_com = 0 }]
-joints = [{ name = "rail", type = "prismatic", parent = "world", child = "block", axis = [1, 0], \
-coordinate = "x" }]
-[[effects]]
-type = "external_force"
-name = "rotor"
-body = "block"
-force = ["3*thrust + wind", 0]
-[[effects]]
-type = "motor"
-name = "push"
-joint = "rail"
-torque = "input"
-"""
+CART = lone(
+    "prismatic",
+    effect("external_force", name="rotor", body="block", force=["3*thrust + wind", 0]),
+    effect("motor", name="push", joint="rail", torque="input"),
+    body="block",
+    on="rail",
+    name="cart",
+    inputs=["thrust", {"name": "wind", "unit": "N", "about": "side wind"}],
+    parameters={"m": 2.0},
+    mass="m",
+    inertia_com=0,
+    axis=[1, 0],
+    coordinate="x",
+)
 
 
 def test_inputs_of_a_scene_enter_its_formulas(tmp_path: Path) -> None:

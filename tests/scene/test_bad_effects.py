@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+from scenes import refusal
 
-from eomgen.base.errors import SceneError
 from eomgen.commands.main import main
 from eomgen.language.formula import Formula
 from eomgen.model.elaborate import elaborate
@@ -123,15 +123,6 @@ def crane(kind: str, dimensions: int = 2, **changed: str | None) -> str:
         + "[[effects]]\n"
         + "".join(f"{k} = {v}\n" for k, v in given.items() if v is not None)
     )
-
-
-def refusal(scene: str) -> str:
-    """The one line that a scene is refused with."""
-    with pytest.raises(SceneError) as error:
-        elaborate(parse_scene(scene, "crane.toml"))
-    message = str(error.value).removeprefix("crane.toml: ")
-    assert "\n" not in message and message.isprintable(), message
-    return message
 
 
 def quantities(kind: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:

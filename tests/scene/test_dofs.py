@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 from engine import MP, Engine, along, apart, exact, plain, quick
-
-from eomgen.base.errors import SceneError
-from eomgen.model.elaborate import elaborate
-from eomgen.scene.reader import parse_scene
+from scenes import refusal
 
 BODY = """
 [[bodies]]
@@ -207,6 +204,4 @@ def test_powers_add_up() -> None:
 )  # fmt: skip
 def test_bad_input_gets_one_clear_line(effect: str, message: str) -> None:
     """Place, value, remedy."""
-    with pytest.raises(SceneError) as error:
-        elaborate(parse_scene(TREE + effect))
-    assert str(error.value).removeprefix("scene: ") == message
+    assert refusal(TREE + effect) == message

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from mjcf_states import Comparison
+from scenes import refusal
 
 import eomgen
 from eomgen.base.errors import SceneError
@@ -317,10 +318,7 @@ def test_files_stay_in_their_folder(tmp_path: Path, text: str, message: str) -> 
         written(tmp_path, f"<mujoco>{BODY.format('')}</mujoco>", name)
     (folder / "link").symlink_to(tmp_path / "other.xml")
     path = written(folder, f"<mujoco>{text}{BODY.format('')}</mujoco>")
-    with pytest.raises(SceneError) as caught:
-        import_file(path)
-    assert message in str(caught.value), caught.value
-    assert "\n" not in str(caught.value)
+    assert message in refusal(lambda: import_file(path))
 
 
 def test_a_compiler_that_ends_is_one_line(tmp_path: Path, monkeypatch: Any) -> None:

@@ -1,11 +1,11 @@
 """The gallery: its first page and its pages, what an interrupt or an error leaves."""
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+from html_pages import Page
 
 import eomgen
 from eomgen.api import exhibiting
@@ -30,24 +30,8 @@ r_child = {arm}
 """
 
 
-class Index(HTMLParser):
-    """The tags of a page with their attributes, and its text."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ""
-        self.feed(path.read_text("utf-8"))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
-
-    def of(self, tag: str, name: str) -> list[str | None]:
-        """An attribute of all tags of a kind."""
-        return [attrs[name] for kind, attrs in self.tags if kind == tag]
+def index_at(path: Path) -> Page:
+    return Page(path.read_text("utf-8"))
 
 
 def scene(
@@ -73,7 +57,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_a_gallery_shows_its_scenes(tmp_path: Path, files: list[str]) -> None:
     """Each with a picture, its texts and a link; nothing else is loaded or run."""
     path = eomgen.gallery(tmp_path / "g", [files[0], files[2]], t_end=0.2, samples=11)
-    index = Index(path)
+    index = index_at(path)
     assert index.of("a", "href") == ["first.html", "third.html"]
     for name in index.of("a", "href"):
         page = (path.parent / str(name)).read_bytes()
@@ -101,7 +85,7 @@ def test_one_that_fails_leaves_the_others(
     assert said.out.splitlines()[0].startswith("1 of 3: wrote g/first.html, 0.")
     assert ", about " in said.out.splitlines()[0]
     assert sorted(p.name for p in Path("g").iterdir()) == ["first.html", "index.html", "third.html"]
-    assert "replay" in Index(Path("g/index.html")).text
+    assert "replay" in index_at(Path("g/index.html")).text
     # What others wrote stays, and is found before anything is computed.
     Path("g/third.html").write_text("mine")
     assert main(command) == 1
@@ -124,11 +108,11 @@ def test_an_interrupt_keeps_what_is_done(
     assert main(command) == 130
     said = capsys.readouterr().err
     assert said == "eomgen: gallery: interrupted; g/index.html shows the 1 of 2 that are done\n"
-    assert Index(Path("g/index.html")).of("a", "href") == ["first.html"]
+    assert index_at(Path("g/index.html")).of("a", "href") == ["first.html"]
     monkeypatch.setattr("eomgen.api.exhibiting.exhibited", stopping)
     with pytest.raises(KeyboardInterrupt):
         eomgen.gallery("h", [files[0], files[2]], t_end=0.2)
-    assert Index(Path("h/index.html")).of("a", "href") == ["first.html"]
+    assert index_at(Path("h/index.html")).of("a", "href") == ["first.html"]
 
 
 def test_names_must_differ(files: list[str]) -> None:
@@ -148,15 +132,6 @@ def test_every_built_in_scene_says_what_it_shows() -> None:
 # ---- Cells of a notebook ----
 
 
-class Cell(Index):
-    """The same of a cell's text."""
-
-    def __init__(self, text: str) -> None:
-        HTMLParser.__init__(self)
-        self.tags, self.text = [], ""
-        self.feed(text)
-
-
 def test_values_show_themselves_in_a_notebook(files: list[str]) -> None:
     """A scene and a model with tables and a sketch, a run with its figure, its page in a frame that
     shares nothing with the notebook, a derivation with MathML.
@@ -164,19 +139,19 @@ def test_values_show_themselves_in_a_notebook(files: list[str]) -> None:
     hostile = scene("hostile", NASTY, NASTY)
     run = eomgen.simulate(hostile, t_end=0.2, samples=11)
     for value in (eomgen.read(hostile), eomgen.check(hostile)):
-        cell = Cell(value._repr_html_())
+        cell = Page(value._repr_html_())
         kinds = [tag for tag, _ in cell.tags]
         assert {"table", "svg"} <= set(kinds) and NASTY in cell.text and "pin_angle" in cell.text
         assert "script" not in kinds and "img" not in kinds
-    cell = Cell(run._repr_html_())
+    cell = Page(run._repr_html_())
     (image,) = cell.of("img", "src")
     assert str(image).startswith("data:image/png;base64,iVBOR") and "steps" in cell.text
-    page = Cell(run.view(height=321)._repr_html_())
+    page = Page(run.view(height=321)._repr_html_())
     ((tag, frame),) = page.tags
     assert tag == "iframe" and frame["sandbox"] == "allow-scripts allow-downloads"
     assert "height:321px" in str(frame["style"])
-    inner = Cell(str(frame["srcdoc"]))
+    inner = Page(str(frame["srcdoc"]))
     assert inner.tags[0][0] == "html" and "Content-Security-Policy" in str(inner.tags)
-    derived = Cell(eomgen.derive(hostile)._repr_html_())
+    derived = Page(eomgen.derive(hostile)._repr_html_())
     ((_, frame),) = derived.tags
     assert frame["sandbox"] == "" and "<math" in str(frame["srcdoc"])

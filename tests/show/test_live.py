@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from campaign import FULL, some
 from live import NODE, run_in_node
+from scenes import effect, lone
 
 import eomgen
 from eomgen.api.given import model_of, read
@@ -161,23 +162,19 @@ def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) 
     assert [(event["kind"], event["contact"]) for event in found["events"]] == kinds
 
 
-STOP = """
-name = "held"
-dimensions = 2
-bodies = [{ name = "block", mass = 2.0, inertia_com = 1.0 }]
-initial = { q = { x = 0.2 } }
-effects = [
-    { type = "external_force", name = "push", body = "block", force = ["-8 + 14*sin(t/2)**2", 0] },
-    { type = "joint_stop", name = "end", joint = "rail", low = 0.0, restitution = 0.4 },
-]
-[[joints]]
-name = "rail"
-type = "prismatic"
-parent = "world"
-child = "block"
-axis = [1, 0]
-coordinate = "x"
-"""
+STOP = lone(
+    "prismatic",
+    effect("external_force", name="push", body="block", force=["-8 + 14*sin(t/2)**2", 0]),
+    effect("joint_stop", name="end", joint="rail", low=0.0, restitution=0.4),
+    body="block",
+    on="rail",
+    name="held",
+    initial={"q": {"x": 0.2}},
+    mass=2.0,
+    inertia_com=1.0,
+    axis=[1, 0],
+    coordinate="x",
+)
 
 
 def test_a_stop_holds_and_lets_go() -> None:
@@ -273,7 +270,7 @@ def test_a_switched_effect_is_left_out() -> None:
       ]);
     });
     """
-    names = [effect["name"] for effect in table["effects"]]
+    names = [acting["name"] for acting in table["effects"]]
     less = [replace_effects(scene, name) for name in names]
     modules = [module_of(replace(elaborate(scene), outputs=OUTPUTS)) for scene in less]
     states = [random_states(module, 10)[1] for module in modules]
@@ -282,7 +279,7 @@ def test_a_switched_effect_is_left_out() -> None:
     for k, (module, own) in enumerate(zip(modules, states, strict=True)):
         expected = [[*module.derivative(0, y), module.potential_energy(0, y)] for y in own]
         np.testing.assert_allclose(found[k], expected, rtol=1e-11, atol=1e-11)
-    assert sum(effect["operations"] > 0 for effect in table["effects"]) > 3
+    assert sum(acting["operations"] > 0 for acting in table["effects"]) > 3
 
 
 def replace_effects(scene: Any, name: str) -> Any:
@@ -291,13 +288,7 @@ def replace_effects(scene: Any, name: str) -> Any:
     return scene.replaced(effects=effects, form="velocity", route="auto")
 
 
-DRIVEN = f"""{PUSHED}
-[[effects]]
-type = "driven"
-name = "swing"
-joint = "elbow"
-coordinate = "sin(3*t)"
-"""
+DRIVEN = PUSHED + effect("driven", name="swing", joint="elbow", coordinate="sin(3*t)")
 
 
 def test_driven_joints_move_with_time() -> None:
@@ -337,13 +328,13 @@ def test_loads_have_the_power_of_their_effects() -> None:
     poses = in_page(code, "bodyPoses", t, y, table).reshape(10, -1, 3, 4)
     speeds = in_page(code, "bodyVelocities", t, y, table).reshape(10, -1, 6)
     powers = np.array([module.effect_powers(a, b) for a, b in zip(t, y, strict=True)])
-    for k, effect in enumerate(table["effects"]):
-        if effect["type"] == "joint_spring":
-            assert not any(load["effect"] == effect["name"] for load in table["loads"])
+    for k, acting in enumerate(table["effects"]):
+        if acting["type"] == "joint_spring":
+            assert not any(load["effect"] == acting["name"] for load in table["loads"])
             continue
         total = np.zeros(10)
         for i, load in enumerate(table["loads"]):
-            if load["effect"] == effect["name"]:
+            if load["effect"] == acting["name"]:
                 body = table["bodies"].index(load["body"])
                 point, force, torque = np.split(loads[:, i], 3, axis=1)
                 velocity, turning = np.split(speeds[:, body], 2, axis=1)

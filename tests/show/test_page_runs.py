@@ -16,6 +16,7 @@ from campaign import some
 from crank_rocker import STOPPED
 from falling_block import BLOCK
 from live import NODE, run_in_node
+from scenes import effect, lone
 
 import eomgen.engine.taylor
 import eomgen.native.taylor
@@ -53,30 +54,19 @@ EQUAL = {**EXPLICIT, **IMPLICIT}
 ADAPTIVE = {"DOP853": 0.01, "taylor": 0.01, "Rodas5P": 0.01}
 """The methods of pages, and the lengths of their steps or those at whose ends rows are, s."""
 
-CORNERS = """
-name = "wheel"
-parameters = { k = 400.0 }
-bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
-joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
-initial = { q = { q = 0.3 }, v = { q_dot = 5.0 } }
-[[effects]]
-type = "motor"
-name = "cam"
-joint = "axle"
-torque = "-3*step(cos(5*q) - cos(pi/40))"
-[[effects]]
-type = "motor"
-name = "stops"
-joint = "axle"
-torque = "-k*max(0, q - 9) + k*max(0, -4 - q)"
-[[effects]]
-type = "joint_friction"
-name = "friction"
-joint = "axle"
-viscous = 0.02
-coulomb = 0.1
-speed = 0.01
-"""
+CORNERS = lone(
+    "revolute",
+    effect("motor", name="cam", joint="axle", torque="-3*step(cos(5*q) - cos(pi/40))"),
+    effect("motor", name="stops", joint="axle", torque="-k*max(0, q - 9) + k*max(0, -4 - q)"),
+    effect("joint_friction", name="friction", joint="axle", viscous=0.02, coulomb=0.1, speed=0.01),
+    body="disc",
+    on="axle",
+    name="wheel",
+    parameters={"k": 400.0},
+    initial={"q": {"q": 0.3}, "v": {"q_dot": 5.0}},
+    inertia_com=0.4,
+    coordinate="q",
+)
 """A wheel between springy stops, that a narrow cam brakes; long steps would pass over it."""
 TIMES = """
 name = "disc"

@@ -9,9 +9,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from effect_cases import CASES, Case
+from scenes import refusal
 
 import eomgen
-from eomgen.base.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.language.rewriting import plain_data
 from eomgen.model.elaborate import elaborate, expanded
@@ -334,16 +334,13 @@ CAMERAS = [
 
 @pytest.mark.parametrize(("shape", "said"), WRONG)
 def test_wrong_shapes_are_refused_in_one_line(shape: str, said: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        lone(0.7, 2, f"shapes = [{shape}]")
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    assert said in refusal(lambda: lone(0.7, 2, f"shapes = [{shape}]"))
 
 
 @pytest.mark.parametrize(("camera", "said"), CAMERAS)
 def test_wrong_cameras_are_refused_in_one_line(camera: str, said: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        picture_in(FREE.format(n=2, inertia=0.7, shapes="") + f"[camera]\n{camera}\n")
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    text = FREE.format(n=2, inertia=0.7, shapes="") + f"[camera]\n{camera}\n"
+    assert said in refusal(lambda: picture_in(text))
 
 
 def test_a_model_knows_nothing_of_pictures_nor_of_integrators() -> None:

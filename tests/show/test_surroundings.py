@@ -10,6 +10,7 @@ from effect_cases import CASES, Case
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Polygon as Patch
 from matplotlib.path import Path as Outline
+from scenes import lone
 from test_show import panel, swinging
 from test_show_space import sliding
 
@@ -240,19 +241,7 @@ def test_figure_shows_what_works_leave_over() -> None:
     panel(kept, "Work of effects")
 
 
-MANY = """\
-name = "many"
-[[bodies]]
-name = "a"
-mass = 1.0
-inertia_com = 0.1
-[[joints]]
-name = "pin"
-type = "revolute"
-parent = "world"
-child = "a"
-r_child = [0.5, 0]
-"""
+MANY = lone("revolute", body="a", on="pin", name="many", r_child=[0.5, 0])
 AIRS = [f'drag"\nname = "air_{k}"\nbody = "a"\nlinear = 0.{k}' for k in (1, 2)]
 KINDS = ['gravity"\ng = 9.81', *AIRS]
 PUSHES = [f'motor"\nname = "push_{k}"\njoint = "pin"\ntorque = {k}' for k in (1, 2, 3, 4)]

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from engine import MP, Digits, apart, exact, read
+from scenes import effect, lone
 
 from eomgen.codegen.system import System
 from eomgen.commands.main import main
@@ -68,23 +69,17 @@ coordinate = "q"
 """
 """A point of mass below a cart of hardly any."""
 
-ALL_FUNCTIONS = """
-name = "push"
-parameters = { k = 1.7, a = 0.3 }
-bodies = [{ name = "b", mass = 1.3, inertia_com = 0.07 }]
-[[joints]]
-name = "pin"
-type = "prismatic"
-parent = "world"
-child = "b"
-axis = [1, 0]
-coordinate = "x"
-[[effects]]
-type = "controller"
-name = "all"
-[effects.torques]
-pin = "FORMULA"
-"""
+ALL_FUNCTIONS = lone(
+    "prismatic",
+    effect("controller", name="all", torques={"pin": "FORMULA"}),
+    on="pin",
+    name="push",
+    parameters={"k": 1.7, "a": 0.3},
+    mass=1.3,
+    inertia_com=0.07,
+    axis=[1, 0],
+    coordinate="x",
+)
 FORMULA = (
     "sin(k)*cos(x) + tan(a*x) + asin(a)*acos(x/9) + atan(k*x) + exp(a*x) + log(k + x*x) + tanh(x)"
     " + sqrt(k)*abs(x) + step(x) + step(a) + atan2(x, k) + min(x, a) + max(x, sin(a)) + 0.1*t"

@@ -12,6 +12,7 @@ import pytest
 from campaign import some
 from engine import MP, read
 from gmpy2 import mpfr
+from scenes import effect
 
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
@@ -264,12 +265,9 @@ r_child = [-0.5, 0.0]
 """
 GRAVITY = '[[effects]]\ntype = "gravity"\ng = 9.81\n'
 DRIVE = '[[effects]]\ntype = "driven"\nname = "drive"\njoint = "j"\ncoordinate = "FORMULA"\n'
-PUSH = """[[effects]]
-type = "external_force"
-name = "push"
-body = "b"
-force = ["5*step(t - 0.01)*step(0.2 - t)", 0.0]
-"""
+PUSH = effect(
+    "external_force", name="push", body="b", force=["5*step(t - 0.01)*step(0.2 - t)", 0.0]
+)
 QUIET = {
     "a body alone, which nothing accelerates": """
 name = "alone"
