@@ -40,6 +40,8 @@ class Displayed:
 
 def _lines(part: object) -> list[str]:
     """A part as text: numbers and names as they are, others by how many or what they are."""
+    if isinstance(part, Displayed) and not hasattr(part, "name"):
+        return _lines(getattr(part, part.shown[0]))
     if hasattr(part, "shape") and hasattr(part, "tolist"):
         return _numbers(part)
     if isinstance(part, bool):
@@ -76,7 +78,7 @@ def _numbers(array: Any) -> list[str]:
     if not 0 < array.size <= ENTRIES or array.ndim > 2 or array.dtype.kind not in "fiu":
         return [f"{array.dtype} {array.shape}"]
     rows = array.reshape(-1, array.shape[-1]) if array.ndim else array.reshape(1, 1)
-    texts = [[f"{x:.6g}" for x in row] for row in rows.tolist()]
+    texts = [[f"{x + 0:.6g}" for x in row] for row in rows.tolist()]
     widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
     return ["  ".join(x.rjust(w) for x, w in zip(row, widths, strict=True)) for row in texts]
 

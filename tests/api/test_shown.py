@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from notebook import cells
 
 import eomgen
 from eomgen.base.displays import MOST
@@ -63,3 +64,11 @@ def test_matrices_and_arrays_of_others_stay_their_own() -> None:
     mine = np.array([0.1, 0.2])
     assert eomgen.grid({"theta": mine}).values.shape == (2, 1)
     mine[0] = 0.3
+
+
+def test_the_tour_of_a_notebook() -> None:
+    """Every cell shows something of its own: tables, equations, a figure, a page, numbers."""
+    shown = cells()
+    marks = ("Pole on a driven cart", "<svg", "<iframe", "<pre>", "<img", "<iframe", "A ", "ended")
+    for cell, mark in zip(shown, marks, strict=True):
+        assert mark in cell

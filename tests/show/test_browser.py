@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from browser import check_page, chromium, missing, opened
+from notebook import cells
 
 import eomgen
 from eomgen.api.runs import Run
@@ -38,6 +39,20 @@ def test_a_page_does_what_it_must(
     monkeypatch.setattr("browser.TIMES", 5)
     save_page(run.motion, run.page(), tmp_path / "page.html")
     assert "bodies fill" in check_page(browser, tmp_path / "page.html", run)
+
+
+def test_cells_of_a_notebook_are_no_higher_than_a_screen(browser: Any) -> None:
+    """As wide as a notebook: a scene, a model, equations, a module, a run, its page, numbers."""
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    heights = []
+    for cell in cells():
+        page.set_content(f"<div id=cell style='font: 14px sans-serif'>{cell}</div>")
+        page.wait_for_function("[...document.images].every((image) => image.complete)")
+        heights.append(
+            page.evaluate("document.querySelector('#cell').getBoundingClientRect().height")
+        )
+    page.close()
+    assert len(heights) == 8 and all(10 < height <= 900 for height in heights), heights
 
 
 def test_hostile_texts_do_nothing(browser: Any, run: Run, tmp_path: Path) -> None:
