@@ -6,7 +6,7 @@ Cottle, Pang, Stone, The Linear Complementarity Problem, sections 4.2 and 4.4.
 from typing import Annotated
 
 from eomgen.engine.least_squares import shortest
-from eomgen.subset.words import Matrix, Vector, Whole, counts, inf, isfinite, numbers, table
+from eomgen.subset.words import Matrix, Vector, Whole, counts, inf, isfinite, numbers
 
 ROUNDING = 1e-10
 """Values below this, relative to the largest offset or force, count as zero."""
@@ -69,7 +69,7 @@ def balance(
 ) -> None:
     """Compute forces, of the `many` contacts that act, under which w is 0 there."""
     place = counts(many)
-    part = table(many, many)
+    part = numbers(many, many)
     wanted = numbers(many)
     found = numbers(many)
     row = 0
@@ -143,7 +143,7 @@ def by_lemke(
 
     Columns are w (0 … n - 1), f (n … 2 n - 1), the artificial variable and the right-hand side.
     """
-    columns = table(n, 2 * n + 2)
+    columns = numbers(n, 2 * n + 2)
     basis = counts(n)
     row = 0
     for i in range(n):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol
 
 from eomgen.engine.complementarity import accelerate, complementary
-from eomgen.subset.words import Vector, Whole, counts, numbers, rows, sqrt, table, zeros
+from eomgen.subset.words import Vector, Whole, counts, numbers, rows, sqrt, zeros
 
 TOLERANCE = 1e-9
 """Contacts with gaps below this touch, and may penetrate by this at the start; in sizes."""
@@ -216,7 +216,7 @@ def press_many(
     n = len(now.holds)
     first = len(y)
     place = counts(many)
-    a = table(many, many)
+    a = numbers(many, many)
     offset = numbers(many)
     forces = numbers(many)
     w = numbers(many)

@@ -5,7 +5,7 @@ Entries are taken one by one: see `numbers`.
 
 from typing import Annotated
 
-from eomgen.subset.words import Matrix, Vector, Whole, counts, numbers, table
+from eomgen.subset.words import Matrix, Vector, Whole, counts, numbers
 
 NO_PIVOT = 1e-10
 """Pivots below this, relative to the first, count as zero."""
@@ -119,7 +119,7 @@ def project_on_range(
 ) -> None:
     """Project b (n,) on the range of a matrix with factors a, whose rank is n - d."""
     rank = n - d
-    space = table(d, n)
+    space = numbers(d, n)
     for k in range(d):
         space[k][rank + k] = 1.0
         for j in range(rank - 1, -1, -1):
@@ -137,7 +137,7 @@ def project_off_null_space(
     is n - d.
     """
     rank = n - d
-    space = table(d, n)
+    space = numbers(d, n)
     for k in range(d):
         space[k][rank + k] = 1.0
         for i in range(rank - 1, -1, -1):
@@ -152,7 +152,7 @@ def project_off(
     n: int, d: int, space: Annotated[Matrix, "d", "n"], x: Annotated[Vector, "n"]
 ) -> None:
     """Project x (n,) on what is orthogonal to the rows of S (d, n): x -= Sᵀ z with S Sᵀ z = S x."""
-    products = table(d, d)
+    products = numbers(d, d)
     wanted = numbers(d)
     for i in range(d):
         for p in range(n):

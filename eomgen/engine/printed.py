@@ -3,8 +3,9 @@
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import fields
 from functools import cache
+
+from numpy import int64
 
 from eomgen.engine import (
     adaptive,
@@ -39,7 +40,7 @@ from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import EQUAL, Root, Roots
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
-from eomgen.subset.structures import arrays_of, records_of
+from eomgen.subset.structures import parts_of
 from eomgen.subset.text import Text, own_name
 from eomgen.subset.unrolled import unrolled_functions
 
@@ -134,16 +135,16 @@ def record_of_pages(kind: type) -> str:
     def size(text: str) -> str:
         return re.sub(r"[A-Za-z_]\w*", lambda found: known.get(found[0], f"given.{found[0]}"), text)
 
-    arrays = {
-        name: f"new {'Int32' if is_whole else 'Float64'}Array({' * '.join(map(size, sizes))})"
-        for name, is_whole, sizes in arrays_of(kind)
+    parts = parts_of(kind)
+    roomy = {
+        name: f"new {'Int32' if of is int64 else 'Float64'}Array({' * '.join(map(size, sizes))})"
+        for name, (of, sizes) in parts.arrays.items()
     }
-    for name, (of, of_size) in records_of(kind).items():
-        unknowns = " * ".join([str(of_size.factor), *map(size, of_size.names)])
-        arrays[name] = f"records.{of.__name__}({{ n: {unknowns} }})"
-    plain = "".join(f"{f.name}: 0, " for f in fields(kind) if f.name not in arrays)
-    roomy = ", ".join(f"{name}: given.{name} ?? {made}" for name, made in arrays.items())
-    return f"{kind.__name__}: (given) => ({{ {plain}...given, {roomy} }})"
+    for name, (of, unknowns) in parts.records.items():
+        roomy[name] = f"records.{of.__name__}({{ n: {size(unknowns)} }})"
+    plain = "".join(f"{name}: 0, " for name in parts.numbers)
+    given = ", ".join(f"{name}: given.{name} ?? {made}" for name, made in roomy.items())
+    return f"{kind.__name__}: (given) => ({{ {plain}...given, {given} }})"
 
 
 @cache

@@ -5,7 +5,7 @@ from typing import Annotated
 from eomgen.engine.adaptive import Bounds, Progress, explicit_step, interpolate, within
 from eomgen.engine.quaternions import normalised
 from eomgen.engine.system import System
-from eomgen.subset.words import Known, Matrix, Vector, Whole, matrix, zeros
+from eomgen.subset.words import Known, Matrix, Vector, Whole, zeros
 
 
 def sampled(
@@ -29,7 +29,7 @@ def sampled(
     """
     raw = zeros(len(y))
     place = zeros(len(y))
-    terms = matrix(7, len(y))
+    terms = zeros(7, len(y))
     done = 0
     while done < count and at.derivatives < most:
         if not explicit_step(method, system, run, at, y, lost, k, raw):

@@ -5,7 +5,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Any
 
 import numpy as np
 
@@ -34,9 +34,8 @@ from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
 from eomgen.subset.languages import Language
-from eomgen.subset.structures import records_of
+from eomgen.subset.structures import extent, parts_of
 from eomgen.subset.text import Text
-from eomgen.subset.words import Whole
 from eomgen.tables.integrators import INTEGRATORS as SPECS
 
 _CALLS = {
@@ -178,8 +177,8 @@ class Part:
     def with_records(self) -> Iterator["Part"]:
         """The records in it, and then it."""
         given = dict(self.given)
-        for name, (of, size) in records_of(self.of).items():
-            own = Part(f"{self.name}_{name}", of, {"n": size.of(self.numbers)})
+        for name, (of, size) in parts_of(self.of).records.items():
+            own = Part(f"{self.name}_{name}", of, {"n": extent(size, self.numbers)})
             given[name] = f"&{own.name}"
             yield own
         yield replace(self, given=given)
@@ -187,11 +186,10 @@ class Part:
     @property
     def arrays(self) -> Iterator[tuple[str, str, str]]:
         """Type, name and size of the arrays that it has room for."""
-        for name, hint in get_type_hints(self.of, include_extras=True).items():
-            if get_origin(hint) is Annotated and name not in self.given:
-                kind, *sizes = get_args(hint)
-                number = "int64_t" if kind == Whole else "real"
+        for name, (of, sizes) in parts_of(self.of).arrays.items():
+            if name not in self.given:
                 texts = (_NAME.sub(self._size, size) for size in sizes)
+                number = "int64_t" if of is np.int64 else "real"
                 yield number, f"{self.name}_{name}", " * ".join(texts)
 
     def _size(self, name: re.Match[str]) -> str:
@@ -201,9 +199,7 @@ class Part:
     @property
     def own(self) -> Mapping[str, int]:
         """Its fields that are numbers, 0 if they are not given."""
-        hints = get_type_hints(self.of)
-        plain = [name for name, hint in hints.items() if hint in (int, float, bool)]
-        return {name: self.numbers.get(name, 0) for name in plain}
+        return {name: self.numbers.get(name, 0) for name in parts_of(self.of).numbers}
 
     @property
     def values(self) -> str:

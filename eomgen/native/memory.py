@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from eomgen.subset.structures import address, fields_of, structure
+from eomgen.subset.structures import address, extent, parts_of, structure
 
 T = TypeVar("T")
 KINDS = (np.float64, np.int64)
@@ -29,10 +29,10 @@ def _layout(record: Any, given: tuple[tuple[str, int], ...]) -> tuple[list[_Part
     are sizes, and -1 for an array.
     """
     of, parts, sizes = dict(given), list[_Part](), [0, 0]
-    for name, lengths, kind in fields_of(record)[1]:
+    for name, (kind, lengths) in parts_of(record).arrays.items():
         if name in of:
             continue
-        k, shape = KINDS.index(kind), tuple(length.of(of) for length in lengths)
+        k, shape = KINDS.index(kind), tuple(extent(length, of) for length in lengths)
         last = sizes[k] + prod(shape)
         parts.append(_Part(name, k, sizes[k], last, shape))
         sizes[k] = last
@@ -48,7 +48,7 @@ def room(record: type[T], **given: Any) -> tuple[T, ctypes.Structure]:
     parts, sizes = _layout(kind, known)
     blocks = [np.empty(size, kind) for size, kind in zip(sizes, KINDS, strict=True)]
     starts = [address(block) if block.size else 0 for block in blocks]
-    names, _ = fields_of(kind)
+    names = parts_of(kind).names
     made = {name: x for name, x in given.items() if name in names}
     of_c: Any = structure(kind)
     places = of_c()

@@ -7,12 +7,11 @@ the others but the same entry; arrays that are used in such loops only are numbe
 import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from eomgen.subset.languages import RESERVED, Language
 from eomgen.subset.text import Kind, NotInSubsetError, Text, is_known, kind_of
-from eomgen.subset.values import OPERATORS, Expressions, Indices, Read, Value
+from eomgen.subset.values import OPERATORS, Expressions, Indices, Read, Value, number
 
 INDICES = ("i_", "j_")
 """Those of loops over arrays; the text has no names that end so."""
@@ -316,7 +315,7 @@ class Function(Expressions):
     def looped(self, loop: Loop) -> list[Item]:
         """A loop over entries."""
         names = INDICES[-len(loop.sizes) :]
-        at = [Value("int", partial(str.format, name)) for name in names]
+        at = [number("int", name) for name in names]
         lines, declared = list[Item](), set[str]()
         for to, op, x in loop.entries:
             is_new = to.base in self.scalars - declared

@@ -45,15 +45,15 @@ class Language:
     """
 
     function: str
-    number: str
-    whole: str
-    names: Mapping[str, str]
-    array: str
-    arrays: tuple[str, str]
-    part: str
     field: str
     prelude: str
+    names: Mapping[str, str]
     words: Mapping[str, str]
+    number: str = ""
+    whole: str = ""
+    arrays: tuple[str, str] = ("", "")
+    array: str = ""
+    part: str = ""
     literal: str = "{}"
     typed: bool = False
     listed: str = ""

@@ -19,12 +19,7 @@ from eomgen.subset.values import TIGHT, Indices, Value
 
 PYTHON = Language(
     function="def {name}({arguments}):",
-    number="",
-    whole="",
     names={"min": "min", "max": "max"},
-    array="",
-    arrays=("", ""),
-    part="{array}[{place}]",
     field=".",
     prelude="""from math import inf, isfinite, nan, sqrt
 

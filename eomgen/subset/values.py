@@ -36,10 +36,9 @@ LEVELS = {"and": DECIDED, "or": DECIDED, "+": 3, "-": 3, "*": 4, "/": 4}
 """How closely operators bind, others as comparisons do: what is looser than its place needs
 parentheses.
 """
-FUNCTIONS = {"abs": "float", "isfinite": "int", "next_after": "float"}
-FUNCTIONS |= dict.fromkeys(OF_NUMBERS, "float")
-"""What functions of numbers return."""
-ZERO = {"zeros": 0.0, "numbers": 0.0, "matrix": 0.0, "table": 0.0, "whole": 0, "counts": 0}
+FUNCTIONS = {"abs", "isfinite", "next_after", *OF_NUMBERS}
+"""Those of numbers."""
+ZERO = {"zeros": 0.0, "numbers": 0.0, "counts": 0}
 """What new arrays have."""
 EVERYWHERE = "everywhere"
 """The place of what a function reads of an array that it is given."""
@@ -85,6 +84,11 @@ class Value(NamedTuple):
 
 
 Indices = Sequence[Value]
+
+
+def number(of: str, text: str) -> Value:
+    """A number that is written so."""
+    return Value(of, lambda _: text)
 
 
 class Expressions:
@@ -152,7 +156,7 @@ class Expressions:
             shown = shown.replace("inf", self.to.names.get("inf", "inf"))
         elif of == "float":
             shown = self.to.literal.format(shown)
-        return Value(of, lambda _: shown, level=SIGNED if x < 0 else TIGHT, known=x)
+        return number(of, shown)._replace(level=SIGNED if x < 0 else TIGHT, known=x)
 
     def unwritten(self, e: ast.AST, why: str, of: str, values: Indices, *sizes: Value) -> Value:
         """What has a kind but no entries to be written."""
@@ -283,9 +287,7 @@ class Expressions:
         if name.isupper() and name in self.module:
             return self.known(e, self.module[name])
         if name.isupper() or name in ("inf", "nan"):
-            return Value(
-                "int" if name.isupper() else "float", lambda _: self.to.names.get(name, name)
-            )
+            return number("int" if name.isupper() else "float", self.to.names.get(name, name))
         raise NotInSubsetError(e, "not in the subset")
 
     def _field(self, e: ast.expr, owner: Value, name: str) -> Value:
@@ -321,22 +323,16 @@ class Expressions:
                 raise NotInSubsetError(i, "parts have no steps")
             lower = self.of(i.lower) if i.lower else self.known(i, 0)
             upper = self.of(i.upper) if i.upper else size
-            if not i.lower:
-                return _Along("0", next, [upper], [upper])
-            size = self.both(i, "-", upper, lower)
             index = lambda at: self.both(i, "+", lower, next(at))  # noqa: E731
-            return _Along(lower.text, index, [size], [lower, upper])
+            return _Along(lower.text, index, [self.both(i, "-", upper, lower)], [lower, upper])
         chosen = self.of(i)
         if chosen.of != "int":
             raise NotInSubsetError(i, "not a whole number")
         if not chosen.sizes:
             return _Along("", lambda _: chosen, [], [chosen])
 
-        def index_of(at: Iterator[Value]) -> Value:
-            shown = chosen.entry([next(at)])
-            return Value("int", lambda _: shown)
-
-        return _Along(ast.unparse(i), index_of, [*chosen.sizes], [chosen])
+        index = lambda at: number("int", chosen.entry([next(at)]))  # noqa: E731
+        return _Along(ast.unparse(i), index, [*chosen.sizes], [chosen])
 
     # ---- calls ----
 
@@ -366,7 +362,7 @@ class Expressions:
             zero = self.known(e, ZERO[name])
             return Value(zero.of, zero.entry, tuple(values), reads=_reads(values))
         if name in FUNCTIONS or name in self.to.names:
-            return self._function(e, name, FUNCTIONS.get(name, "float"), values)
+            return self._function(e, name, "int" if name == "isfinite" else "float", values)
         raise NotInSubsetError(e, "not in the subset, or not known")
 
     def _of_text(self, e: ast.Call, name: str, args: list[ast.expr]) -> Value:

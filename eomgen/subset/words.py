@@ -21,7 +21,7 @@ may be assigned as a whole, `step.place = place`; then only one of the two is us
 Entries may be given at once, `place[0:2] = [a, b]`.
 
 Where few numbers are taken one by one, lists are several times as fast in Python as arrays:
-`numbers`, `counts` and `table`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
+`numbers` and `counts`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
 Python gives functions that take entries only either of them.
 """
 
@@ -37,9 +37,9 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
-    "counts", "exp", "in_loops", "inf", "isfinite", "larger", "log", "matrix", "nan",
-    "next_after", "numbers", "ordered", "product", "rows", "sqrt", "table", "transposed",
-    "unrolled", "whole", "with_arrays", "with_lists", "zeros",
+    "counts", "exp", "in_loops", "inf", "isfinite", "larger", "log", "nan", "next_after",
+    "numbers", "ordered", "product", "rows", "sqrt", "transposed", "unrolled", "with_arrays",
+    "with_lists", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -65,34 +65,20 @@ class Row(tuple[tuple[int, float], ...]):
         return np.array([[factors.get(j, 0.0)] for j in range(max(factors) + 1)])
 
 
-def zeros(n: int) -> Vector:
-    """A vector of n zeros."""
-    return np.zeros(n)
+def zeros(*sizes: int) -> Vector:
+    """An array of zeros, of these sizes."""
+    return np.zeros(sizes)
 
 
-def whole(n: int) -> Whole:
-    """n whole numbers, which are 0."""
-    return np.zeros(n, dtype=np.int64)
-
-
-def matrix(rows: int, columns: int) -> Matrix:
-    """A matrix of zeros."""
-    return np.zeros((rows, columns))
-
-
-def numbers(n: int) -> Any:
-    """A list of n zeros."""
-    return [0.0] * n
+def numbers(*sizes: int) -> Any:
+    """A list of zeros, or one of such rows."""
+    n, *rest = sizes
+    return [numbers(*rest) for _ in range(n)] if rest else [0.0] * n
 
 
 def counts(n: int) -> Any:
     """A list of n whole numbers, which are 0."""
     return [0] * n
-
-
-def table(rows: int, columns: int) -> Any:
-    """Rows of zeros, in lists."""
-    return [[0.0] * columns for _ in range(rows)]
 
 
 def rows(many: int, n: int) -> Any:

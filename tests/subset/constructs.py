@@ -11,10 +11,10 @@ from eomgen.subset.words import (
     added,
     all_within,
     copy,
+    counts,
     inf,
     isfinite,
     larger,
-    matrix,
     nan,
     next_after,
     ordered,
@@ -22,7 +22,6 @@ from eomgen.subset.words import (
     rows,
     sqrt,
     unrolled,
-    whole,
     zeros,
 )
 
@@ -121,7 +120,7 @@ def matrices(n: int, m: int, a: Annotated[Matrix, "n", "m"], x: Annotated[Vector
         below = a[i, 0]
         a[i, 1:] -= below * x[1:]
     a[1:, 1:] *= 0.5
-    other = matrix(n, m)
+    other = zeros(n, m)
     other[:, :] = a * 0.5
     a[:, :] += other
 
@@ -133,7 +132,7 @@ def products(n: int, m: int, a: Annotated[Matrix, "n", "m"], x: Annotated[Vector
     small = all_within(abs(half), found)
     scale = larger(half, 1.0)
     lower = all_within(found - half, scale * 2.0)
-    b = matrix(m, n)
+    b = zeros(m, n)
     b[0, :] = product(a, x * 2.0)
     a[:, 0] = b[0]
     return small + 2 * lower
@@ -144,7 +143,7 @@ def chosen(n: int, which: Annotated[Whole, "m"], m: int, x: Annotated[Vector, "n
     some = copy(x[which])
     x[which] = 0.25 * some + 1.0
     x[which] += some * some
-    a = matrix(n, m)
+    a = zeros(n, m)
     for i in range(1, 2):
         a[which, i] = some
         x[:] = x * 1.0
@@ -154,7 +153,7 @@ def chosen(n: int, which: Annotated[Whole, "m"], m: int, x: Annotated[Vector, "n
 
 def whole_numbers(n: int, order: Annotated[Whole, "n"], x: Annotated[Vector, "n"]) -> int:
     """Arrays of whole numbers, as places."""
-    turned = whole(n)
+    turned = counts(n)
     for i in range(n):
         turned[i] = order[n - 1 - i]
     for i in range(n):
