@@ -26,12 +26,12 @@ from eomgen.commands.main import main, parsers
 
 EOMGEN = (sys.executable, "-m", "eomgen")
 QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
-ARM = Path(__file__).parent.parent / "arm.urdf"
+TESTS = Path(__file__).parent.parent
 COMMANDS = {
     "list": "list", "show": "show pendulum", "new": "new {out}/swing",
     "copy": "copy pendulum {out}/mine", "completion": "completion bash", "schema": "schema",
     "reference": "reference",
-    "import": f"import {ARM} -o {{out}}/arm.toml",
+    "import": f"import {TESTS / 'arm.urdf'} -o {{out}}/arm.toml",
     "check": "check two_body", "derive": "derive two_body",
     "generate": "generate pendulum -o {out}",
     "export": "export pendulum --firmware -o {out}",
@@ -41,6 +41,7 @@ COMMANDS = {
     "verify": "verify pendulum --states 1",
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
+    "fit": f"fit pendulum {TESTS / 'swing.csv'} --names gravity_g",
     "linearise": "linearise cart_pole",
     "plot": "plot pendulum --of theta,energy --t-end 0.1 -o {out}/p.pdf",
     "film": "film pendulum --t-end 0.1 -o {out}/f.gif",
@@ -446,6 +447,6 @@ def test_an_interrupt_within_this_process(
     assert main(["simulate", "pendulum", "-o", str(tmp_path)]) == 130
     assert capsys.readouterr().err == "eomgen: pendulum: interrupted at t = 0\n"
     assert len(list(tmp_path.iterdir())) == 5
-    monkeypatch.setattr("eomgen.commands.describing.read_model", stopped)
+    monkeypatch.setattr("eomgen.commands.describing.checked", stopped)
     assert main(["check", "pendulum"]) == 130
     assert capsys.readouterr().err == "eomgen: interrupted\n"
