@@ -26,7 +26,7 @@ from eomgen.study.verification.states import random_state
 
 __all__ = [
     "MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "motion", "plain",
-    "quick", "read", "text_of", "unit_state", "varied",
+    "quick", "read", "slopes", "text_of", "unit_state", "varied",
 ]  # fmt: skip
 
 STEP = MP.mpf(10) ** -20
@@ -165,6 +165,29 @@ def motion(
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:
     """The derivative of f at x in a direction: a central difference, some 40 digits."""
     return (f(x + STEP * way) - f(x - STEP * way)) / (2 * STEP)
+
+
+def slopes(
+    made: Engine,
+    output: str,
+    y: Sequence[Any],
+    u: Mapping[str, Any] | None = None,
+    p: Mapping[str, Any] | None = None,
+    t: Any = 0,
+) -> np.ndarray:
+    """The rates of the state, differentiated in 60 digits by the state, by inputs or by parameters,
+    as an output of `DERIVATIVES` is.
+    """
+    u, p = u or {}, p or dict(made.module.PARAMETERS)
+    given = dict(zip(DERIVATIVES, (y, [*u.values()], [*p.values()]), strict=True))
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        state, *others = {**given, output: x}.values()
+        named = (dict(zip(of, each, strict=True)) for of, each in zip((u, p), others, strict=True))
+        return made.exactly("derivative", state, *named, t=t)
+
+    start = exact(given[output])
+    return np.array([along(rates, start, way) for way in exact(np.eye(len(start)))]).T
 
 
 def apart(actual: Any, expected: Any, *terms: Any) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine import Engine, along, apart, engine, exact, varied
+from engine import Engine, along, apart, engine, exact, slopes, varied
 from spatial_trees import random_spatial_tree
 
 from eomgen.dynamics.start.assembly import assembled
@@ -86,24 +86,6 @@ def made(name: str, route: str, *, tangents: bool = False) -> Engine:
     return engine(text, route, leave_out=ASIDE, tangents=tangents)
 
 
-def differences(e: Engine, output: str, y: np.ndarray, u: dict, p: dict) -> np.ndarray:
-    """The same matrix by central differences of `derivative`, in 60 digits."""
-    given = {"jacobian": dict(zip(e.module.STATES, y, strict=True))}
-    given |= {"input_jacobian": u, "parameter_jacobian": p}
-    start = exact(np.array(list(given[output].values())))
-
-    def f(x: np.ndarray) -> np.ndarray:
-        match output:
-            case "jacobian":
-                return e.exactly("derivative", x, u, p)
-            case "input_jacobian":
-                return e.exactly("derivative", y, dict(zip(u, x, strict=True)), p)
-        return e.exactly("derivative", y, u, dict(zip(p, x, strict=True)))
-
-    columns = [along(f, start, exact(way)) for way in np.eye(len(start))]
-    return np.array(columns, dtype=object).T
-
-
 def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
     """A state with quaternions of any length, inputs, and parameters off the scene's own."""
     rng = np.random.default_rng(seed)
@@ -125,7 +107,7 @@ def test_derivatives_are_exact(name: str, route: str) -> None:
     assert [bool(e.system.tangents) for e in forms] == [False, True][: len(forms)]
     y, u, p = state(forms[0], 71)
     for output in outputs:
-        expected = differences(forms[0], output, y, u, p)
+        expected = slopes(forms[0], output, y, u, p)
         assert expected.shape == forms[0].system.program.outputs[output].shape
         for e in forms:
             assert apart(e.exactly(output, y, u, p), expected) < EXACT, output
@@ -140,7 +122,7 @@ def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
     y, u, p = state(e, 72)
     for output in DERIVATIVES:
         if output in e.system.program.outputs:
-            expected = differences(e, output, y, u, p)
+            expected = slopes(e, output, y, u, p)
             for row, wanted in zip(e.exactly(output, y, u, p), expected, strict=True):
                 size = np.max(np.abs(wanted), initial=0)
                 assert np.max(np.abs(row - wanted), initial=0) <= 1e-12 * size + 1e-30, output

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import BUILT_IN
-from engine import along, apart, exact, varied
+from engine import apart, slopes, varied
 from mechanisms import Compiled, compiled, random_tree
 
 TREES = (9, 22, 7)
@@ -51,13 +51,9 @@ def test_jacobian(scene: str | int, form: str) -> None:
     """The exact Jacobian is the derivative's, differentiated in 60 digits, in every state form."""
     scene = scene if isinstance(scene, str) else random_tree(scene)
     c = compiled(scene, form)
-    n = len(c.module.STATES)
     rng = np.random.default_rng(33)
-    y, u = rng.uniform(-3.0, 3.0, n), c.random_inputs(rng)
-    columns = [
-        along(lambda z: c.exactly("derivative", z, u), exact(y), unit) for unit in exact(np.eye(n))
-    ]
-    expected = np.array(columns).T
+    y, u = rng.uniform(-3.0, 3.0, len(c.module.STATES)), c.random_inputs(rng)
+    expected = slopes(c, "jacobian", y, u)
     ours = c.module.jacobian(0.0, y, u=u)
     assert_close(ours, expected)
     both = np.column_stack((y, y))
@@ -72,23 +68,14 @@ def test_jacobians_by_inputs_and_parameters(scene: str | int, form: str) -> None
     scene = scene if isinstance(scene, str) else random_tree(scene)
     c = compiled(scene, form)
     module, rng = c.module, np.random.default_rng(34)
-    names = {"input": tuple(module.INPUTS), "parameter": tuple(module.PARAMETERS)}
     y, u = rng.uniform(-3.0, 3.0, len(module.STATES)), c.random_inputs(rng)
-    values = varied(c.model, rng, 0.5, 2.0) | u
-
-    def rates(by: tuple[str, ...], at: np.ndarray) -> np.ndarray:
-        changed = {**values, **dict(zip(by, at, strict=True))}
-        return c.exactly("derivative", y, changed, changed)
-
-    p = {name: values[name] for name in module.PARAMETERS}
-    for kind, by in names.items():
+    p = varied(c.model, rng, 0.5, 2.0)
+    for output, by in (("input_jacobian", u), ("parameter_jacobian", p)):
         if not by:
-            assert f"{kind}_jacobian" not in module.COST
+            assert output not in module.COST
             continue
-        at = exact([values[name] for name in by])
-        ways = exact(np.eye(len(by)))
-        expected = np.array([along(lambda z, by=by: rates(by, z), at, way) for way in ways]).T
-        function = getattr(module, f"{kind}_jacobian")
+        expected = slopes(c, output, y, u, p)
+        function = getattr(module, output)
         assert_close(function(0.0, y, p, u), expected)
         assert_close(function(0.0, np.column_stack((y, y)), p, u)[:, :, 1], expected)
         assert np.any(expected)

@@ -10,7 +10,7 @@ from functools import cache, partial
 import numpy as np
 import pytest
 from campaign import some
-from engine import MP, Engine, along, apart, engine
+from engine import MP, Engine, along, apart, engine, slopes
 from scenes import WEIGHT, effect, free, lone, refusal
 from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
@@ -204,13 +204,6 @@ def test_a_spring_between_free_bodies_keeps_momentum(
 # Points that meet.
 
 
-def central(found: Engine, y: np.ndarray) -> np.ndarray:
-    """∂f/∂y by central differences in 60 digits."""
-    ways = np.array([[MP.mpf(int(i == j)) for j in range(len(y))] for i in range(len(y))])
-    columns = [along(lambda z: found.exactly("derivative", z), y, way) for way in ways]
-    return np.array(columns).T
-
-
 ZERO_CASES = {
     "no length": ("stiffness = 30.0",),
     "damped": ("stiffness = 30.0", "damping = 4.0"),
@@ -245,7 +238,7 @@ def test_points_may_meet(case: str, dimensions: int) -> None:
         assert np.all(np.isfinite(rate)) and np.all(np.isfinite(jacobian))
         assert math.isfinite(module.potential_energy(0.0, y))
         if dimensions == PLANE or x == 0.0:
-            expected = central(found, np.array([MP.mpf(z) for z in y])).astype(float)
+            expected = slopes(found, "jacobian", y).astype(float)
             assert apart(jacobian, expected) < 1e-11
         if x == 0.0 and case != "slack rope":
             damping = 4.0 if "damping = 4.0" in lines else 0.0
