@@ -97,13 +97,26 @@ def runge_kutta(
 ) -> None:
     """A step of an explicit method: Hairer, Nørsett, Wanner, definition II.1.1."""
     k = rows(method.stages, len(y))
-    k[0] = system.derivative(t, y)
-    for i in unrolled(range(1, method.stages)):
-        place = y + h * added(a * k[j] for j, a in method.rows[i])
-        k[i] = system.derivative(t + method.c[i] * h, place)
-    step.change = h * added(b * k[j] for j, b in method.sums)
-    step.place = place if method.stages > 1 else y
+    by_slopes(method, system, t, y, h, k, step)
     step.slope = k[method.stages - 1]
+
+
+def by_slopes(
+    method: Known,
+    system: System,
+    t: float,
+    y: Annotated[Vector, "STATES"],
+    h: float,
+    k: Annotated[Matrix, "4", "STATES"],
+    step: Step,
+) -> None:
+    """The same step, without the last slope, and the slopes in it."""
+    k[0] = system.derivative(t, y)
+    step.place = copy(y)
+    for i in unrolled(range(1, method.stages)):
+        step.place = y + h * added(a * k[j] for j, a in method.rows[i])
+        k[i] = system.derivative(t + method.c[i] * h, step.place)
+    step.change = h * added(b * k[j] for j, b in method.sums)
 
 
 def semi_implicit_euler(

@@ -23,6 +23,7 @@ import sys
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
 from eomgen.native.compiler import find_compiler
 from eomgen.native.module import usual_constants
+from eomgen.run.compiled import Stretch
 from eomgen.run.module import as_problem, load_module
 from eomgen.store import generated_code, interfaced_program_of
 
@@ -149,28 +151,23 @@ class Members:
             given = dict(zip(self.module.INPUTS, u.tolist(), strict=True))
             problem = accelerator.at(None, given).of(as_problem(self.module, None, given))
             assert problem.compiled is not None
-            steps = problem.compiled.steps("dop853", ())
+            steps = problem.compiled.steps("DOP853", ())
             made.append((steps, start, problem.derivative(0.0, start), np.array(problem.sizes)))
 
         def call() -> np.ndarray:
             ends = []
             for steps, start, slope, sizes in made:
-                t, y, memory = 0.0, start, {"h_abs": 1e-4, "f": slope, "lost": 0.0 * start}
-                while True:
-                    stride = steps(
-                        *(t, y, memory),
-                        t_end=T_END,
-                        rtol=RTOL,
-                        atol=1e-12 * sizes,
-                        longest=math.inf,
-                        times=np.empty(0),
-                        most=1024,
-                    )
-                    if not len(stride.ends):
-                        break
-                    t, y = float(stride.ends[-1]), stride.states[-1]
-                    memory = {name: values[-1] for name, values in stride.memory.items()}
-                ends.append(y)
+                at = SimpleNamespace(t=0.0, y=start, h_abs=1e-4, f=slope, lost=0.0 * start)
+                stretch = Stretch(
+                    *(at, T_END, True, RTOL, 1e-12 * sizes, math.inf, 1024),
+                    *(False, False, np.empty(0), None, None, False, None),
+                )
+                while at.t < T_END:
+                    stride = steps(stretch)
+                    assert stride.usual
+                    at.t, at.y = float(stride.ends[-1]), stride.states[-1]
+                    vars(at).update({n: values[-1] for n, values in stride.memory.items()})
+                ends.append(at.y)
             return np.array(ends)
 
         return call

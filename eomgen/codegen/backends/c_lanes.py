@@ -13,6 +13,8 @@ from typing import Any
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.explicit import RUNGE_KUTTA_4
+from eomgen.engine.methods import Roots
 from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
@@ -38,6 +40,11 @@ def files(
 
     usual_length  lengths of quaternions between which squares neither overflow nor underflow
     """
+    # Imported here because backends without lanes do without the printer.
+    from eomgen.engine.printed import c_source
+    from eomgen.subset.languages import VECTORS
+
+    steps: Roots = [("by_slopes", {"method": RUNGE_KUTTA_4}), ("add_compensated", {})]
     program = ordered(program)
     context = c.context(program, interface)
     wanted = [f.name for f in interface.functions if f.name != "initial_state"]
@@ -46,6 +53,7 @@ def files(
         "positions": [int(state.position) for state in interface.states],
         "limit": LIMIT,
         "noise": NOISE,
+        "engine": VECTORS.prelude + c_source(steps, VECTORS),
     }
     return {**c.files_of(context, interface), MAIN: render(c.TEMPLATES, "lanes.c.jinja", values)}
 
