@@ -113,7 +113,6 @@ def Contact(
     bodies: Literal["all"] | Sequence[str] | None = ...,
     points: Sequence[str] | None = ...,
     at: Sequence[float | str] = ...,
-    law: Literal["spring_damper", "hunt_crossley", "impact"],
     against: Literal["plane", "ball", "each_other"] = ...,
     radius: float | str = ...,
     radii: Mapping[str, float | str] = ...,
@@ -123,6 +122,10 @@ def Contact(
     other: str = ...,
     other_at: Sequence[float | str] = ...,
     other_radius: float | str = ...,
+    shapes: Mapping[str, Table | Mapping[str, Any]] = ...,
+    pairs: Sequence[Sequence[str]] = ...,
+    except_pairs: Sequence[Sequence[str]] = ...,
+    law: Literal["spring_damper", "hunt_crossley", "impact"],
     stiffness: float | str = ...,
     damping: float | str = ...,
     dissipation: float | str = ...,
@@ -130,8 +133,6 @@ def Contact(
     friction: float | str = ...,
     slip_speed: float | str | None = ...,
     allow_active: bool = ...,
-    shapes: Mapping[str, Table | Mapping[str, Any]] = ...,
-    except_pairs: Sequence[Sequence[str]] = ...,
 ) -> Table:
     """Contact of spheres (circles in the plane), points, and corners of boxes.
 
@@ -186,8 +187,8 @@ def ContactShape(
     A plane is touched by the ends of a capsule, the corners of a box, the vertices of a hull, and
     by the lowest point of an ellipsoid, Σ w (w·n)/sqrt(Σ (w·n)²) with its half-axes w. A flat
     ellipsoid is a disc: the rim of a cylinder is one at each end. Spheres, capsules and boxes touch
-    each other where their cores are nearest, a capsule and a box at the ends of the capsule, too,
-    and two boxes at the corners of each. One of two needs a `radius`, within which they may
+    each other where their cores are nearest, a capsule and a box at the ends of the capsule, and
+    two boxes at the corners of each, too. One of two needs a `radius`, within which they may
     overlap.
     """
     ...

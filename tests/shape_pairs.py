@@ -23,12 +23,10 @@ SHAPES: Mapping[str, Shape] = {
     "box": {"half_sizes": [0.3, 0.5, 0.7]},
     "rounded box": {"half_sizes": [0.3, 0.5, 0.7], "radius": 0.1},
 }
-EXACT = [
+PAIRS = [
     *(("sphere", "sphere"), ("sphere", "capsule"), ("capsule", "capsule")),
-    *(("sphere", "box"), ("capsule", "box")),
+    *(("sphere", "box"), ("capsule", "box"), ("rounded box", "box")),
 ]
-BOXES = ("rounded box", "box")
-"""These see corners and no crossing edges."""
 
 
 def model_of(first: str, second: str) -> Model:

@@ -650,7 +650,8 @@ BAD = {
         "effects[0].body: one body has no other to touch; give two or more in bodies"
     ),
     (*SOFT, EACH, "normal = [0, 1]"): (
-        "effects[0].normal: does not belong to against 'each_other'; it takes except_pairs"
+        "effects[0].normal: does not belong to against 'each_other'; it takes pairs, "
+        "except_pairs"
     ),
     (*SOFT, 'against = "ball"', "corners = [0.1, 0.1]"): (
         "effects[0].corners: does not belong to against 'ball'; it takes other_radius, "
@@ -658,6 +659,9 @@ BAD = {
     ),
     (*SOFT, 'against = "ball"'): f"effects[0].other_radius: {MEET}",
     ("BOTH", *SOFT, EACH): f"effects[0].radius: {MEET}",
+    ("BOTH", *SOFT, EACH, "radius = 1", 'pairs = [["a", "b"]]'): (
+        "effects[0].pairs[0]: 'a' is no shape here; name two of them"
+    ),
     ("TWICE", *SOFT, EACH, "radius = 1"): (
         "effects[0].bodies[1]: 'a' is listed twice; leave one out"
     ),

@@ -33,8 +33,8 @@ class ContactShape(Table):
     A plane is touched by the ends of a capsule, the corners of a box, the vertices of a hull, and
     by the lowest point of an ellipsoid, Σ w (w·n)/sqrt(Σ (w·n)²) with its half-axes w. A flat
     ellipsoid is a disc: the rim of a cylinder is one at each end. Spheres, capsules and boxes touch
-    each other where their cores are nearest, a capsule and a box at the ends of the capsule, too,
-    and two boxes at the corners of each. One of two needs a `radius`, within which they may
+    each other where their cores are nearest, a capsule and a box at the ends of the capsule, and
+    two boxes at the corners of each, too. One of two needs a `radius`, within which they may
     overlap.
     """
 
@@ -159,7 +159,6 @@ radius = 0.03
 def between_count(first: ContactShape, second: ContactShape, dimensions: int) -> int:
     """At how many points two spheres, capsules or boxes touch: see `nearest.between`."""
     boxes = [shape for shape in (first, second) if shape.half_sizes]
-    others = [shape for shape in (first, second) if not shape.half_sizes]
-    if not boxes:
-        return 1
-    return 2 << dimensions if not others else 3 if others[0].end else 1
+    if len(boxes) == 2:
+        return (2 << dimensions) + (dimensions == 3)
+    return 3 if boxes and (first.end or second.end) else 1

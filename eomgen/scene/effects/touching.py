@@ -31,12 +31,14 @@ class Touch:
     sides        the first body and, unless it is the world, the second
     energy_term  times the elastic force it is added to the potential energy, m; None for 0. It is
                  not 0 only if centres are within ε = `NEAREST` of each other: (ε² - d²)/(2 ε)
+    share        times friction; None for 1. It is not 1 only there: (d/ε)²
     """
 
     normal: Vector
     gap: Scalar
     sides: tuple[Side, ...]
     energy_term: Scalar | None = None
+    share: Scalar | None = None
 
 
 @dataclass(frozen=True)
@@ -114,23 +116,28 @@ def _lowest(mechanism: Mechanism, solid: Solid, normal: Vector) -> Iterator[tupl
 
 
 def on_ball(
-    mechanism: Mechanism, first: Solid, second: Solid, arms: tuple[Vector, Vector] = ((), ())
+    mechanism: Mechanism,
+    first: Solid,
+    second: Solid,
+    arms: tuple[Vector, Vector] = ((), ()),
+    apart: Vector = (),
 ) -> Touch:
     """The contact of two solids at points of their cores, at least one with a radius > 0.
 
     The points are at `arms` from where each is `at`, world axes, m; without these they are there,
-    as the centres of balls. P divides the line between them in the ratio of the radii. It is one
+    as the centres of balls. `apart` is the vector from the second point to the first, if it is
+    known with less rounding. P divides the line between them in the ratio of the radii. It is one
     point of both bodies at any depth, so the forces conserve angular momentum. If the points are
     within ε = `NEAREST` of each other, n is d/ε with the vector d from the second to the first, so
     it falls to 0.
     """
     if first.body == WORLD:
-        first, second, arms = second, first, arms[::-1]
+        first, second, arms, apart = second, first, arms[::-1], negative(apart)
     ends = []
     for solid, arm in zip((first, second), arms, strict=True):
         place = mechanism.position(solid.body, solid.at)
         ends.append(add(place, arm) if arm else place)
-    d = mechanism.called("d", *sub(*ends))
+    d = mechanism.called("d", *(apart or sub(*ends)))
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
     (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
@@ -143,7 +150,8 @@ def on_ball(
     )
     normal = mechanism.called("n", *(x / length for x in d))
     (gap,) = mechanism.called("g", length - both)
-    return Touch(normal, gap, sides, (larger - square) / (length + length))
+    term = (larger - square) / (length + length)
+    return Touch(normal, gap, sides, term, square / larger)
 
 
 def gap_rate_of(mechanism: Mechanism, touch: Touch) -> Scalar:
