@@ -15,6 +15,7 @@ def import_robot(
     floating: bool = False,
     stops: bool = False,
     contacts: bool = False,
+    self_contacts: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Imported:
     """Read a robot file, URDF or MJCF: its `tables`, as a scene's file holds them, and `remarks`.
@@ -25,6 +26,8 @@ def import_robot(
               them is reported
     contacts  whether collision geometry touches the ground, softly: the planes of an MJCF file's
               world; z = 0 for a URDF, which then starts on it if it moves freely
+    self_contacts  whether it touches the ground and, between bodies that no joint connects, itself
+              and fixed obstacles: at most 200 pairs of spheres, capsules and boxes
     allow     folders in which meshes and included files may lie, beside the file's own
 
     All functions that take a scene take `tables`, and the path of a robot file as well. `toml()`
@@ -34,5 +37,11 @@ def import_robot(
     robot.
     """
     allowed = tuple(map(Path, allow))
-    wishes = Wishes(floating=floating, stops=stops, contacts=contacts, allowed=allowed)
+    wishes = Wishes(
+        floating=floating,
+        stops=stops,
+        contacts=contacts,
+        self_contacts=self_contacts,
+        allowed=allowed,
+    )
     return import_file(find_scene(str(path)), wishes)

@@ -8,11 +8,13 @@ from eomgen.base.files import write_whole
 from eomgen.commands.shared import Arguments, note
 from eomgen.scene.reader import LARGEST_FILE, imported_scene, parse_scene
 
+WISHES = ("floating", "stops", "contacts", "self_contacts")
+
 
 def import_(given: Arguments) -> int:
     """Write a robot file as a scene."""
     source = Path(given.robot)
-    wishes = {"floating": given.floating, "stops": given.stops, "contacts": given.contacts}
+    wishes = {key: getattr(given, key) for key in WISHES}
     found = import_robot(source, **wishes, allow=given.allow)
     path: Path = given.output or Path(f"{imported_scene(found, source.name).name}.toml")
     if path.exists() and not given.force:

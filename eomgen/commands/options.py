@@ -286,6 +286,9 @@ class Imported(Forced):
     contacts: bool = option(
         False, "let collision geometry touch the ground: planes of an MJCF file, else z = 0"
     )
+    self_contacts: bool = option(
+        False, "let collision geometry touch the ground, itself and fixed obstacles"
+    )
     allow: Sequence[Path] = option(
         (),
         "also read meshes and included files in this folder; else only beside ROBOT",

@@ -1,13 +1,14 @@
 """Imported robots on the ground: they settle, gain no energy, and sink in by little.
 
-    python tests/campaigns/standing.py FILE… [--allow DIR]… [--count 20] [--time 5]
+    python tests/campaigns/standing.py FILE… [--allow DIR]… [--count 20] [--time 5] [--self]
+        [--integrator DOP853]
 
 Robots are passive: their actuators, and bounds of joints, are left out on both sides. Each is
 dropped from where its file has it, a URDF from where it touches the ground. Printed are the energy
 at the start and the end, J; the greatest gain of energy between two rows relative to that at the
 start; the greatest depth at the end, mm; the greatest speed there; and of an MJCF file how high the
-centre of mass is then, with what MuJoCo has. What has not come to rest, or lies on itself, is
-elsewhere there.
+centre of mass is then, with what MuJoCo has. What has not come to rest, or without `--self` lies
+on itself, is elsewhere there.
 """
 
 import argparse
@@ -55,20 +56,28 @@ def in_mujoco(path: Path, seconds: float, ours: np.ndarray) -> tuple[float, floa
     return height, float(data.subtree_com[0][2]), depth
 
 
-def settled(path: Path, allow: list[str], seconds: float) -> tuple[str, bool]:
+def settled(path: Path, options: argparse.Namespace) -> tuple[str, bool]:
     """What is printed of a robot, and whether it is within the bounds."""
     given = eomgen.import_robot(
         path,
         floating=path.suffix == ".urdf",
         contacts=True,
-        allow=[path.parent, *allow],
+        self_contacts=options.self,
+        allow=[path.parent, *options.allow],
     )
     tables = dict(given.tables)
-    tables["effects"] = [e for e in tables["effects"] if e["type"] not in ACTIVE]
+    active = [e["name"] for e in tables["effects"] if e["type"] in ACTIVE]
+    tables["effects"] = [e for e in tables["effects"] if e.get("name") not in active]
+    defined = tables.pop("definitions", {}).items()
+    if kept := {k: v for k, v in defined if not any(name in v for name in active)}:
+        tables["definitions"] = kept
     if not any(e["type"] == "contact" for e in tables["effects"]):
         raise EomgenError("has no contact with the ground")
     tables["outputs"] = ["kinetic_energy", "potential_energy"]
-    run = eomgen.simulate(tables, t_end=seconds, rtol=1e-4, atol=1e-6)
+    method, seconds = options.integrator, options.time
+    run = eomgen.simulate(tables, t_end=seconds, integrator=method, rtol=1e-4, atol=1e-6)
+    if not run.finished:
+        raise EomgenError(run.message)
     energy = np.asarray(run.energy)
     gain = max(float(np.diff(energy).max()), 0.0) / abs(energy[0])
     depth = depth_of(run.model, np.asarray(run.y[-1]))
@@ -93,12 +102,14 @@ def main() -> int:
     parser.add_argument("--allow", action="append", default=[])
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--time", type=float, default=5.0)
+    parser.add_argument("--self", action="store_true")
+    parser.add_argument("--integrator", default="DOP853")
     given = parser.parse_args()
     good = tried = 0
     for path in given.files[: given.count]:
         start = time.process_time()
         try:
-            said, within = settled(path, given.allow, given.time)
+            said, within = settled(path, given)
         except EomgenError as error:
             print(f"{path.name}: {error}", flush=True)
             continue

@@ -56,6 +56,38 @@ MJCF = """
 """
 
 
+LINK = """<link name="{}"><inertial><mass value="0.5"/>
+<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry>{}</geometry></collision></link>"""
+JOINT = """<joint name="to_{}" type="{}"><origin xyz="{}"/><parent link="{}"/><child link="{}"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>"""
+PILE = """
+<mujoco model="pile">
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1"/>
+    <geom name="wall" type="plane" size="5 5 1" euler="0 90 0" pos="-2 0 0"/>
+    <geom name="rock" type="sphere" size="0.5"/>
+    <body name="base"><geom name="post" type="capsule" size="0.4" fromto="0 0 -1 0 0 1"/>
+      <body name="hung"><joint axis="0 1 0"/><geom name="bob" type="box" size="0.4 0.5 0.6"/></body>
+    </body>
+    <body name="trunk"><freejoint/><geom name="back" type="sphere" size="0.3" margin="0.01"/>
+      <body name="rest"><geom name="tail" type="sphere" size="0.3"/>
+        <body name="leg"><joint axis="1 0 0"/><geom name="thigh" type="sphere" size="0.3"/>
+          <body name="foot"><joint axis="0 1 0"/>
+            <geom name="sole" type="cylinder" size="0.2 0.3"/>
+            <geom name="ghost" type="sphere" size="0.3" contype="2" conaffinity="4"/>
+            <geom name="seen" type="sphere" size="0.3" contype="4" conaffinity="0"/></body>
+        </body>
+      </body>
+    </body>
+    <body name="other"><freejoint/><geom name="heavy" type="box" size="0.6 0.5 0.4"/></body>
+  </worldbody>
+  <contact><exclude body1="other" body2="leg"/>
+    <pair geom1="back" geom2="thigh" friction="0.3 0.3 0.1 0.1 0.1" margin="0.02"/></contact>
+</mujoco>
+"""
+
+
 def contacts_of(found: Any) -> list[dict[str, Any]]:
     """The contacts among the effects of an imported robot."""
     return [effect for effect in found.tables["effects"] if effect["type"] == "contact"]
@@ -126,6 +158,60 @@ def test_a_robot_comes_to_rest_where_it_does_in_mujoco(tmp_path: Path) -> None:
     ours = found.mujoco(eomgen.load(run.module)).position(run.y[-1])
     assert abs(ours[2] - data.qpos[2]) < 1e-4
     assert np.abs(ours[3:7] - data.qpos[3:7]).max() < 2e-3
+
+
+def test_geoms_touch_each_other_where_mujoco_lets_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Obstacles of the world, too: all geoms overlap, and those that touch are MuJoCo's contacts.
+    Of too many the nearest are taken, and that is said.
+    """
+    mujoco = pytest.importorskip("mujoco")
+    path = written(tmp_path, "pile.xml", PILE)
+    found = eomgen.import_robot(path, self_contacts=True)
+    made = contacts_of(found)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, names = mujoco.MjData(model), [model.geom(g).name for g in range(model.ngeom)]
+    ours = {
+        frozenset(names[int(name.rpartition("_")[2]) - 1] for name in pair)
+        for effect in made
+        for pair in effect.get("pairs", ())
+    }
+    mujoco.mj_forward(model, data)
+    both = [frozenset(model.geom(g).name for g in (c.geom1, c.geom2)) for c in data.contact]
+    assert ours == {pair for pair in both if not pair & {"floor", "wall"}}
+    given = next(e for e in made if len(e.get("pairs", ())) == 1 and e["friction"] == 0.3)
+    assert {s["radius"] for s in given["shapes"].values()} == {0.3, 0.31}
+    assert next(e for e in made if e["name"].startswith("wall"))["normal"] == (1.0, 0.0, 0.0)
+    read_tables(dict(found.tables))
+    monkeypatch.setattr("eomgen.scene.importers.pairs.MOST_PAIRS", 2)
+    few = eomgen.import_robot(path, self_contacts=True)
+    assert sum(len(effect.get("pairs", ())) for effect in contacts_of(few)) == 2
+    assert any(f"nearest at the start ({len(ours) - 2})" in remark for remark in few.remarks)
+
+
+def test_links_touch_each_other_unless_they_are_joined_or_overlap(tmp_path: Path) -> None:
+    """Cylinders as the capsules within them."""
+    text = URDF.format('<cylinder radius="0.1" length="0.5"/>', "revolute")
+    links, joints = "", ""
+    for name, parent, kind, at, shape in (
+        ("foot", "leg", "fixed", "0 0 0", '<sphere radius="0.1"/>'),
+        ("toe", "foot", "revolute", "2 0 0", '<sphere radius="0.1"/>'),
+        ("far", "trunk", "revolute", "-1 0 0", '<box size="0.2 0.2 0.4"/>'),
+        ("near", "trunk", "revolute", "1.2 0 -1.7", '<capsule radius="0.1" length="0.2"/>'),
+    ):
+        links += LINK.format(name, shape)
+        joints += JOINT.format(name, kind, at, parent, name)
+    path = written(tmp_path, "box.urdf", text.replace("</robot>", f"{links}{joints}</robot>"))
+    found = eomgen.import_robot(path, floating=True, self_contacts=True)
+    own = next(effect for effect in contacts_of(found) if effect["name"] == "self")
+    pairs = {frozenset(name.rpartition("_")[0] for name in pair) for pair in own["pairs"]}
+    moving = [("leg", "far"), ("leg", "near"), ("foot", "far"), ("foot", "near")]
+    assert pairs == {*map(frozenset, [*moving, ("toe", "trunk"), ("toe", "far"), ("far", "near")])}
+    shape = own["shapes"]["leg_2"]
+    assert shape["radius"] == 0.1
+    assert np.allclose([shape["at"], shape["end"]], [[0, 0, -0.35], [0, 0, -0.05]])
+    assert any("pairs that touch at the start (1)" in remark for remark in found.remarks)
 
 
 def test_the_rims_of_a_cylinder_are_where_they_are() -> None:

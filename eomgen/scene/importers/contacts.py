@@ -1,8 +1,8 @@
-"""Collision geometry of robot files as shapes of contacts with the ground."""
+"""Collision geometry of robot files as shapes of contacts."""
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eomgen.base.errors import listed
+from eomgen.scene.importers.pairs import MOST_PAIRS, ROUNDING, Part, Pose, nearest_pairs
 from eomgen.scene.importers.parts import Parts
 from eomgen.scene.importers.rotations import angles_of, rotation, to_axis
 from eomgen.scene.importers.vectors import Vector
@@ -32,25 +33,70 @@ DIGITS = 9
 
 @dataclass
 class Contacts:
-    """Contacts of a robot with planes, as they are collected.
+    """Contacts of a robot, as they are collected.
 
     shapes  by effect: name, body and law; in each the shapes by name
+    pairs   of shapes that touch each other, by effect
     made    how many there are of each kind, taken whole or as more shapes
     lost    likewise of those that have no counterpart
     off     how far a mesh's hull is outside of that of the vertices taken, at most, m
+    notes   other remarks
     """
 
     shapes: dict[tuple[tuple[str, Any], ...], dict[str, Table]] = field(default_factory=dict)
+    pairs: dict[tuple[tuple[str, Any], ...], list[list[str]]] = field(default_factory=dict)
     made: Counter[str] = field(default_factory=Counter)
     lost: Counter[str] = field(default_factory=Counter)
     off: float = 0.0
+    notes: list[str] = field(default_factory=list)
 
-    def add(self, law: Mapping[str, Any], body: str, kind: str, shapes: Sequence[Table]) -> None:
-        """Add the shapes of a body that touch by a law: keys of an effect, with its name."""
+    def add(self, law: Mapping[str, Any], part: Part) -> None:
+        """Add a part that touches a plane by a law: keys of an effect, with its name."""
         own = self.shapes.setdefault(tuple(law.items()), {})
-        self.made[kind] += 1
-        for shape in shapes:
-            own[f"{body}_{len(own) + 1}"] = {"body": body} | shape
+        self.made[part.kind] += 1
+        for shape in part.shapes:
+            own[f"{part.body}_{len(own) + 1}"] = {"body": part.body} | shape
+
+    def add_pairs(
+        self,
+        parts: Sequence[Part],
+        pairs: Iterable[tuple[int, int]],
+        poses: Mapping[str, Pose],
+        law: Callable[[int, int], Mapping[str, Any]],
+        apart: bool = False,
+    ) -> None:
+        """Add the pairs of parts that touch each other, each by its law; with `apart` only those
+        that do not touch in the bodies' poses.
+        """
+        cores, known = list[tuple[str, Table]](), dict[int, int]()
+        for i, one in enumerate(parts):
+            if one.core is not None:
+                known[i] = len(cores)
+                cores.append((one.body, one.core))
+        every = list(pairs)
+        both = [(known[i], known[j]) for i, j in every if i in known and j in known]
+        self.lost["pairs with ellipsoids, meshes or flat cylinders"] += len(every) - len(both)
+        found, touching, many = nearest_pairs(cores, both, poses, lambda gap: gap > 0 or not apart)
+        self.lost["pairs that touch at the start"] += touching
+        self.lost[f"pairs beyond the {MOST_PAIRS} nearest at the start"] += many
+        numbers, used = list(known), set[int]()
+        for pair in found:
+            first, second = (numbers[i] for i in pair)
+            key = tuple({"against": "each_other", **law(first, second)}.items())
+            own = self.shapes.setdefault(key, {})
+            names = [f"{parts[i].body}_{i + 1}" for i in (first, second)]
+            for name, core in zip(names, pair, strict=True):
+                own[name] = {"body": cores[core][0]} | cores[core][1]
+            self.pairs.setdefault(key, []).append(names)
+            used.update((first, second))
+        if found:
+            self.notes.append(f"soft contacts of shapes with each other: {len(found)} pairs")
+        kinds = {parts[i].kind for i in used}
+        if "box" in kinds:
+            rounding = f"{100 * ROUNDING:g} % of their smallest half size"
+            self.notes.append(f"boxes that touch other shapes are rounded by {rounding}")
+        if "cylinder" in kinds:
+            self.notes.append("cylinders touch other shapes as the capsules within them")
 
     def hull(self, corners: Array) -> Table:
         """The hull of a mesh's corners in body axes."""
@@ -63,8 +109,10 @@ class Contacts:
         taken = {effect.get("name") for effect in parts.effects}
         for keys, shapes in self.shapes.items():
             table = {"type": "contact", "law": "spring_damper", **dict(keys)}
+            name, number = table["name"], 1
             while table["name"] in taken:
-                table["name"] += "_contact"
+                number += 1
+                table["name"] = f"{name}_{number}"
             taken.add(table["name"])
             if table["friction"]:
                 table["slip_speed"] = SLIP_SPEED
@@ -72,20 +120,22 @@ class Contacts:
                 parts.parameters[SLIP_SPEED] = {"value": SLIP, "unit": "m/s", "about": about}
             else:
                 del table["friction"]
+            if pairs := self.pairs.get(keys):
+                table["pairs"] = pairs
             parts.effects.append(table | {"shapes": shapes})
 
     def remarks(self) -> Iterator[str]:
-        """What touches the ground, and what does not."""
+        """What touches the ground and other shapes, and what does not."""
         kinds = ", ".join(f"{count} {_several(kind, count)}" for kind, count in self.made.items())
         yield f"soft contacts with the ground: {kinds or 'none'}"
+        yield from self.notes
         if self.off:
             yield (
                 f"hulls of meshes have at most {MOST_VERTICES} vertices in contacts; what is left "
                 f"out is within {1e3 * self.off:.1f} mm"
             )
-        if self.lost:
-            lost = listed(f"{what} ({count})" for what, count in self.lost.items())
-            yield f"left out of contacts: {lost}"
+        if lost := [f"{what} ({count})" for what, count in self.lost.items() if count]:
+            yield f"left out of contacts: {listed(lost)}"
 
 
 def _several(kind: str, count: int) -> str:

@@ -19,12 +19,14 @@ class Wishes:
     floating  the root link moves freely instead of being fixed to the world
     stops     the limits of joints are rigid stops
     contacts  collision geometry touches the ground
+    self_contacts  it touches the ground and itself
     allowed   folders that files named in the robot file may lie in, beside its own folder
     """
 
     floating: bool = False
     stops: bool = False
     contacts: bool = False
+    self_contacts: bool = False
     allowed: tuple[Path, ...] = ()
 
 

@@ -60,7 +60,7 @@ def massless(name: str) -> dict[str, Any]:
 
 def _body(model: Compiled, k: int, names: Names, made: Mechanism) -> dict[str, Any]:
     axes = matrix_of(model["body_iquat"][k])
-    entries = rotated_inertia([*model["body_inertia"][k], 0.0, 0.0, 0.0], axes)
+    entries = cleaned(rotated_inertia([*model["body_inertia"][k], 0.0, 0.0, 0.0], axes))
     mass = model["body_mass"][k]
     table: dict[str, Any] = {
         "name": names.bodies[k],

@@ -21,7 +21,10 @@ SECONDS = 60.0
 MISSING = "reading MJCF needs MuJoCo 4; install it with: pip install 'eomgen[robots]'"
 NO_MUJOCO = 3
 """The exit code of `compiler` without it."""
-MEASURED = ("body_", "jnt_", "dof_", "geom_", "actuator_", "tendon_", "wrap_", "eq_data", "qpos")
+MEASURED = (
+    *("body_", "jnt_", "dof_", "geom_", "pair_", "actuator_", "tendon_", "wrap_", "eq_data"),
+    "qpos",
+)
 """Beginnings of the names of arrays in which each number must be finite."""
 
 

@@ -30,6 +30,7 @@ PREFIXES = (
     "wrap_",
     "eq_",
     "exclude_",
+    "pair_",
     "mat_rgba",
     "mesh_vert",
     "qpos",

@@ -1,8 +1,8 @@
-"""Contacts of geoms with the planes of the world as soft contacts of a scene.
+"""Contacts of geoms with planes and each other as soft contacts of a scene.
 
 MuJoCo's contact is a soft constraint: the acceleration a of the gap g meets a + R f = -b ġ - k d g
 for its force f (documentation, "Computation", section "Parameters"), where d is the impedance,
-R = (1 - d)/d A with the inverse A of the mass that the body of the geom has there, and b and k
+R = (1 - d)/d A with the inverse A of the mass that the bodies of the geoms have there, and b and k
 follow from `solref`. Where a is small beside the right side, as at rest, this is the law
 f = -K g - C ġ with K = k d²/((1 - d) A). d depends on the depth (`solimp`); K is taken where it
 carries half of the weight of all bodies. A pyramid of friction has 2 (condim - 1) edges, each with
@@ -12,6 +12,9 @@ ratio of b and k.
 """
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,7 @@ from eomgen.scene.importers import contacts as shapes
 from eomgen.scene.importers.contacts import Contacts
 from eomgen.scene.importers.mjcf.compiled import Compiled
 from eomgen.scene.importers.mjcf.mechanism import Mechanism, Names
-from eomgen.scene.importers.mjcf.poses import angles, matrix_of
+from eomgen.scene.importers.mjcf.poses import angles, cleaned, line_of, matrix_of
 from eomgen.scene.importers.mjcf.shapes import (
     BOX,
     CAPSULE,
@@ -32,6 +35,7 @@ from eomgen.scene.importers.mjcf.shapes import (
     SPHERE,
 )
 from eomgen.scene.importers.names import identifiers
+from eomgen.scene.importers.pairs import Part, Pose, part
 from eomgen.scene.importers.rotations import image
 
 NO_CONTACT = 1 << 4
@@ -52,40 +56,94 @@ DIGITS = 6
 """Significant digits of what is computed here."""
 
 
-def add_contacts(model: Compiled, names: Names, made: Mechanism) -> None:
-    """The contacts of geoms with planes of the world, and remarks."""
+@dataclass(frozen=True)
+class Mixed:
+    """What MuJoCo mixes of two geoms, or a `<pair>` says of them."""
+
+    friction: float
+    condim: int
+    solref: Any
+    solimp: Any
+    margin: float
+
+
+def add_contacts(model: Compiled, names: Names, made: Mechanism, *, each_other: bool) -> None:
+    """The contacts of geoms with planes, with each other if wished, and remarks."""
     found, off = Contacts(), bool(model["opt_disableflags"] & NO_CONTACT)
-    planes = [g for g in _geoms(model, 0) if model["geom_type"][g] == PLANE]
+    touching = {} if off else _touching(model)
+    planes = [g for g in range(model["ngeom"]) if model["geom_type"][g] == PLANE]
     called = identifiers((model.names["geom"][g] for g in planes), "ground")
-    for plane in planes:
-        for k in range(1, model["nbody"]):
-            for g in _geoms(model, k) if not off else ():
-                if not _touch(model, plane, g):
-                    continue
-                kind = model["geom_type"][g]
-                if kind not in KINDS:
-                    found.lost["fields of heights and distance functions"] += 1
-                    continue
-                law = _law(model, plane, g, k)
-                name = f"{called[model.names['geom'][plane]]}_{names.bodies[k]}"
-                keys = {"name": name, **_half_space(model, plane), **law}
-                found.add(keys, names.bodies[k], KINDS[kind], _shapes(model, plane, g, found))
+    pairs = dict[tuple[int, int], Mixed]()
+    for (a, b), mixed in touching.items():
+        if {model["geom_type"][a], model["geom_type"][b]} - {PLANE} - {*KINDS}:
+            found.lost["fields of heights and distance functions"] += 1
+        elif PLANE not in (model["geom_type"][a], model["geom_type"][b]):
+            pairs[a, b] = mixed
+        else:
+            plane, g = (a, b) if model["geom_type"][a] == PLANE else (b, a)
+            body = names.bodies[model["geom_bodyid"][g]]
+            name = f"{called[model.names['geom'][plane]]}_{body}"
+            law = _law(model, mixed, _mass(model, a, b))
+            keys = {"name": name, **_half_space(model, plane, names), **law}
+            found.add(keys, _part(model, g, body, mixed.margin, found))
+    if each_other:
+        _add_pairs(model, names, pairs, found)
+    elif pairs:
+        found.lost["pairs of geoms that are no planes"] = len(pairs)
     found.effects(made)
-    pairs = sum(
-        _touch(model, a, b)
-        for a in range(model["ngeom"])
-        for b in range(a)
-        if PLANE not in (model["geom_type"][a], model["geom_type"][b])
-    )
-    if pairs and not off:
-        found.lost["pairs of geoms that are no planes"] = pairs
     for remark in found.remarks():
         made.remark(remark)
 
 
-def _geoms(model: Compiled, body: int) -> range:
-    first = model["body_geomadr"][body]
-    return range(first, first + model["body_geomnum"][body])
+def _add_pairs(
+    model: Compiled, names: Names, pairs: Mapping[tuple[int, int], Mixed], found: Contacts
+) -> None:
+    """The contacts of geoms with each other. Their masses are rounded to powers of 4, so that many
+    share a law.
+    """
+    parts, unread = list[Part](), Contacts()  # vertices of meshes are not taken here
+    for g in range(model["ngeom"]):
+        body, kind = names.bodies[model["geom_bodyid"][g]], model["geom_type"][g]
+        margin = model["geom_margin"][g] - model["geom_gap"][g]
+        known = kind in KINDS and kind != MESH
+        parts.append(
+            _part(model, g, body, margin, unread) if known else Part(body, "mesh", (), None)
+        )
+
+    def law(a: int, b: int) -> dict[str, Any]:
+        mass = 4.0 ** round(math.log(_mass(model, a, b), 4))
+        return {"name": "self", **_law(model, pairs[a, b], mass)}
+
+    found.add_pairs(parts, pairs, _poses(model, names), law)
+
+
+def _poses(model: Compiled, names: Names) -> dict[str, Pose]:
+    """The poses of all bodies in the file's own position."""
+    turns, places = [np.eye(3)], [np.zeros(3)]
+    for k in range(1, model["nbody"]):
+        above = model["body_parentid"][k]
+        turns.append(turns[above] @ np.array(matrix_of(model["body_quat"][k])))
+        places.append(places[above] + turns[above] @ np.array(model["body_pos"][k]))
+    return dict(zip(names.bodies, zip(turns, places, strict=True), strict=True))
+
+
+def _touching(model: Compiled) -> dict[tuple[int, int], Mixed]:
+    """The geoms that may touch: those of a `<pair>`, and those that MuJoCo's filters let touch."""
+    found = {
+        (a, b): _mixed(model, a, b)
+        for a, b in combinations(range(model["ngeom"]), 2)
+        if _touch(model, a, b)
+    }
+    for p in range(model["npair"]):
+        a, b = sorted((model["pair_geom1"][p], model["pair_geom2"][p]))
+        found[a, b] = Mixed(
+            model["pair_friction"][p][0],
+            model["pair_dim"][p],
+            model["pair_solref"][p],
+            model["pair_solimp"][p],
+            model["pair_margin"][p] - model["pair_gap"][p],
+        )
+    return found
 
 
 def _touch(model: Compiled, a: int, b: int) -> bool:
@@ -106,15 +164,16 @@ def _touch(model: Compiled, a: int, b: int) -> bool:
     return not (first and second) or not (above[0] == second or above[1] == first)
 
 
-def _half_space(model: Compiled, plane: int) -> dict[str, Any]:
-    normal = image(matrix_of(model["geom_quat"][plane]), (0.0, 0.0, 1.0))
+def _half_space(model: Compiled, plane: int, names: Names) -> dict[str, Any]:
+    normal = cleaned(image(matrix_of(model["geom_quat"][plane]), (0.0, 0.0, 1.0)))
     offset = math.fsum(n * x for n, x in zip(normal, model["geom_pos"][plane], strict=True))
-    found: dict[str, Any] = {} if normal == (0.0, 0.0, 1.0) else {"normal": list(normal)}
+    found: dict[str, Any] = {} if normal == [0.0, 0.0, 1.0] else {"normal": tuple(normal)}
+    if body := model["geom_bodyid"][plane]:
+        found["other"] = names.bodies[body]
     return found | ({"offset": offset} if offset else {})
 
 
-def _law(model: Compiled, a: int, b: int, body: int) -> dict[str, float]:
-    """Stiffness, damping and friction between two geoms, of which `b` is one of the body."""
+def _mixed(model: Compiled, a: int, b: int) -> Mixed:
     first, second = (model["geom_priority"][g] for g in (a, b))
     share = model["geom_solmix"][a], model["geom_solmix"][b]
     part = share[0] / sum(share) if sum(share) else 0.5
@@ -124,24 +183,37 @@ def _law(model: Compiled, a: int, b: int, body: int) -> dict[str, float]:
         return np.dot([part, 1 - part], [model[key][a], model[key][b]])
 
     high = [g for g, priority in ((a, first), (b, second)) if priority == max(first, second)]
-    friction = max(model["geom_friction"][g][0] for g in high)
-    condim = max(model["geom_condim"][g] for g in high)
-    friction = friction if condim > 1 else 0.0
-    solimp = mixed("geom_solimp")
-    most = min(max(solimp[1], LEAST), 1 - LEAST)
-    time, ratio = mixed("geom_solref")
+    return Mixed(
+        max(model["geom_friction"][g][0] for g in high),
+        max(model["geom_condim"][g] for g in high),
+        mixed("geom_solref"),
+        mixed("geom_solimp"),
+        math.fsum(model["geom_margin"][g] - model["geom_gap"][g] for g in (a, b)),
+    )
+
+
+def _mass(model: Compiled, a: int, b: int) -> float:
+    """1/A of two geoms, kg; if A is 0, as on an axis, the mass of all bodies."""
+    inverse = sum(model["body_invweight0"][model["geom_bodyid"][g]][0] for g in (a, b))
+    return 1 / inverse if inverse else math.fsum(model["body_mass"])
+
+
+def _law(model: Compiled, mixed: Mixed, mass: float) -> dict[str, float]:
+    """Stiffness, damping and friction between two geoms with a mass 1/A, kg."""
+    friction = mixed.friction if mixed.condim > 1 else 0.0
+    most = min(max(mixed.solimp[1], LEAST), 1 - LEAST)
+    time, ratio = mixed.solref
     if time > 0:
         time = max(time, 2 * model["opt_timestep"])
         k = 1 / (most * time * ratio) ** 2
     else:
         k = -time / most**2
         ratio = -ratio / most / (2 * math.sqrt(k))
-    mass = 1 / model["body_invweight0"][body][0]
     load = math.hypot(*model["opt_gravity"]) * sum(model["body_mass"]) / 2 or mass
     edges = 1.0
     if friction and model["opt_cone"] == PYRAMID:
-        edges = model["opt_impratio"] * (condim - 1) / (friction**2 * (1 + friction**2))
-    stiffness = _stiffness(k * mass * edges, solimp, load)
+        edges = model["opt_impratio"] * (mixed.condim - 1) / (friction**2 * (1 + friction**2))
+    stiffness = _stiffness(k * mass * edges, mixed.solimp, load)
     found = {"stiffness": stiffness, "damping": 2 * ratio * math.sqrt(stiffness * mass)}
     return {**{key: float(f"{x:.{DIGITS}g}") for key, x in found.items()}, "friction": friction}
 
@@ -172,15 +244,12 @@ def _impedance(solimp: Any, depth: float) -> float:
     return float(min(max(first + part * (last - first), LEAST), 1 - LEAST))
 
 
-def _shapes(model: Compiled, plane: int, g: int, found: Contacts) -> list[shapes.Table]:
-    """The shapes of a geom, larger by the margins of both: MuJoCo's contacts act from there."""
+def _part(model: Compiled, g: int, body: str, margin: float, found: Contacts) -> Part:
+    """A geom as a part of a body, larger by a margin: MuJoCo's contacts act from there."""
     kind, (a, b, c) = model["geom_type"][g], model["geom_size"][g]
     at, quat = model["geom_pos"][g], model["geom_quat"][g]
-    turn = matrix_of(quat)
-    margin = math.fsum(model["geom_margin"][x] - model["geom_gap"][x] for x in (plane, g))
     degrees = [DEGREES * angle for angle in angles(quat)]
-    arm = image(turn, (0.0, 0.0, b))
-    ends = np.subtract(at, arm).tolist(), np.add(at, arm).tolist()
+    ends = line_of(at, quat, b)
     match kind:
         case _ if kind == SPHERE:
             tables = shapes.sphere(at, a)
@@ -193,10 +262,10 @@ def _shapes(model: Compiled, plane: int, g: int, found: Contacts) -> list[shapes
         case _ if kind == BOX:
             tables = shapes.box(at, (a, b, c), degrees)
         case _:
-            tables = [found.hull(_corners(model, g) @ np.array(turn).T + at)]
+            tables = [found.hull(_corners(model, g) @ np.array(matrix_of(quat)).T + at)]
     if margin:
         tables = [table | {"radius": table.get("radius", 0.0) + margin} for table in tables]
-    return tables
+    return part(body, KINDS[kind], tables)
 
 
 def _corners(model: Compiled, g: int) -> shapes.Array:

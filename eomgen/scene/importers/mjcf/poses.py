@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from eomgen.scene.importers.rotations import Matrix, angles_of
+from eomgen.scene.importers.rotations import Matrix, angles_of, image
 from eomgen.scene.importers.vectors import Vector
 
 NEAR = 1e-14
@@ -54,7 +54,20 @@ def angles(quaternion: Sequence[float]) -> Vector:
 
 def cleaned(vector: Sequence[float]) -> list[float]:
     """A vector without components that are rounding errors of 0."""
-    slight = NEAR * max(map(abs, vector), default=0.0)
+    return _without(vector, NEAR * max(map(abs, vector), default=0.0))
+
+
+def line_of(
+    at: Sequence[float], quaternion: Sequence[float], half: float
+) -> tuple[list[float], list[float]]:
+    """Both ends of a line along z of half a length about a point, turned."""
+    arm = image(matrix_of(quaternion), (0.0, 0.0, half))
+    slight = NEAR * max(map(abs, (*at, *arm)), default=0.0)
+    start, end = ([x + sign * d for x, d in zip(at, arm, strict=True)] for sign in (-1, 1))
+    return _without(start, slight), _without(end, slight)
+
+
+def _without(vector: Sequence[float], slight: float) -> list[float]:
     return [x if abs(x) > slight else 0.0 for x in vector]
 
 

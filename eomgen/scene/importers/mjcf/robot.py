@@ -28,7 +28,6 @@ COUNTED = {
     "nflex": "flexible bodies",
     "nskin": "skins",
     "nplugin": "plugins",
-    "npair": "pairs of contacts",
 }
 
 
@@ -45,8 +44,8 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
             f"the file's pose is beyond the limits of {listed(map(repr, moved))}, which start "
             "between them"
         )
-    if wishes.contacts:
-        add_contacts(model, names, made)
+    if wishes.contacts or wishes.self_contacts:
+        add_contacts(model, names, made, each_other=wishes.self_contacts)
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
     if changed:
         made.remark(f"renamed: {listed(changed)}")
@@ -128,8 +127,11 @@ def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
             f"viscosity {model['opt_viscosity']:g} Pa s; an effect drag may replace them"
         )
     touching = any(model["geom_contype"]) or any(model["geom_conaffinity"])
-    if touching and not wishes.contacts:
-        yield "left out: contacts between geoms; import with --contacts adds those with planes"
+    if touching and not (wishes.contacts or wishes.self_contacts):
+        yield (
+            "left out: contacts between geoms; import with --contacts adds those with planes, with "
+            "--self-contacts those with each other, too"
+        )
     if any("limits" in joint for joint in made.joints) and not wishes.stops:
         yield (
             "a coordinate beyond the limits of its joint is reported, not prevented; import with "

@@ -4,7 +4,7 @@ from typing import Any
 
 from eomgen.scene.importers.mjcf.compiled import Compiled
 from eomgen.scene.importers.mjcf.mechanism import Mechanism
-from eomgen.scene.importers.mjcf.poses import angles, matrix_of
+from eomgen.scene.importers.mjcf.poses import angles, line_of, matrix_of
 from eomgen.scene.importers.rotations import image
 
 PLANE, HEIGHTS, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
@@ -33,11 +33,7 @@ def _shape(model: Compiled, g: int, made: Mechanism) -> list[dict[str, Any]]:
         case _ if kind == SPHERE:
             table = {"type": "sphere", "radius": a, "center": at}
         case _ if kind in (CAPSULE, CYLINDER):
-            arm = image(matrix_of(quat), (0.0, 0.0, b))
-            ends = {
-                "start": [x - d for x, d in zip(at, arm, strict=True)],
-                "end": [x + d for x, d in zip(at, arm, strict=True)],
-            }
+            ends = dict(zip(("start", "end"), line_of(at, quat, b), strict=True))
             size = {"width": 2 * a} if kind == CAPSULE else {"radius": a}
             table = {"type": "rod" if kind == CAPSULE else "cylinder", **ends, **size}
         case _ if kind == ELLIPSOID:

@@ -61,8 +61,9 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
         raise robot.error("nothing can move; let the root move freely with --floating")
     if wishes.stops:
         add_stops(made)  # all start between their limits
-    if wishes.contacts:
-        remarks += add_contacts(tree, inertials, names, made, meshes)
+    if wishes.contacts or wishes.self_contacts:
+        each_other = wishes.self_contacts
+        remarks += add_contacts(tree, inertials, names, made, meshes, each_other=each_other)
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes, wishes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
@@ -180,8 +181,13 @@ def _remarks_on_bodies(
         yield f"inertias of links without mass count with what carries them: {lent}"
     if changes.still:
         yield f"left out: inertias of links that cannot move: {_listed(changes.still)}"
-    if not wishes.contacts and any(link.first("collision") for link in tree.links.values()):
-        yield "left out: collision geometry; import with --contacts lets it touch the ground"
+    if not (wishes.contacts or wishes.self_contacts) and any(
+        link.first("collision") for link in tree.links.values()
+    ):
+        yield (
+            "left out: collision geometry; import with --contacts lets it touch the ground, with "
+            "--self-contacts itself, too"
+        )
     if meshes.drawn:
         yield f"{meshes.drawn} meshes are drawn as the boxes around them"
     for reason in dict.fromkeys(meshes.missing.values()):
