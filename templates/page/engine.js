@@ -15,6 +15,7 @@ const makeEngine = (mechanism, data) => {
   const LIFTED = 0.3; // part of the whole mass that a pull moves at least as quickly
   const STRONG = 30; // acceleration that the strongest pull gives the whole mass at least, m/s²
   const [SAFE, FASTEST] = [0.01, 1e3]; // margin of constraints, and greatest entry of states, to go back to
+  const [MOST_LED, LED] = [200, 0.1]; // steps to a state that is given, and the greatest change of a coordinate in each
   const SHARE = 0.02; // part of the mean cost of a step that the last one has
 
   const all = [...methods, ...adaptive];
@@ -264,8 +265,8 @@ const makeEngine = (mechanism, data) => {
     start = goal = engine.t;
     guarded(renew);
   };
-  // Begin again from a state, by default the initial one.
-  engine.reset = (y = null, t = 0) => {
+  // Begin again from a state, by default the initial one; `given` by hand, from the nearest one that is possible.
+  engine.reset = (y = null, t = 0, given = false) => {
     engine.error = null;
     engine.release();
     safe = null;
@@ -273,10 +274,32 @@ const makeEngine = (mechanism, data) => {
     guarded(() => {
       engine.t = t;
       engine.y.set(y ?? data.initial ?? mechanism.initialState(engine.p));
+      if (given) projected(t, engine.y);
       change = all.find((m) => m.name === engine.method).make(free);
       law = makeLaw();
       restart();
     });
+  };
+  // Give state k a value. Loops take the other coordinates along: the state goes there in the directions that they allow.
+  engine.lead = (y, k, value) => {
+    const velocities = Array.from(others).filter((i) => kinds[i] === "velocity");
+    const place = quaternions.length ? -1 : positions.indexOf(k);
+    if (!held || place < 0) {
+      y[k] = value;
+      return;
+    }
+    const speeds = velocities.map((i) => y[i]);
+    for (let count = 0; count < MOST_LED; count += 1) {
+      velocities.forEach((i, j) => (y[i] = Number(j === place)));
+      projected(engine.t, y);
+      const way = velocities.map((i) => y[i]);
+      const step = (value - y[k]) / way[place];
+      const most = LED / Math.max(...way.map(Math.abs));
+      if (!Number.isFinite(step) || Math.abs(value - y[k]) <= 1e-12 * (1 + Math.abs(value))) break;
+      positions.forEach((i, j) => (y[i] += Math.max(-most, Math.min(most, step)) * way[j]));
+    }
+    velocities.forEach((i, j) => (y[i] = speeds[j]));
+    projected(engine.t, y);
   };
   engine.cost = () => cost;
   // Call the derivative for so many ms, so that the browser compiles it; ms of the fastest call.

@@ -76,7 +76,13 @@ const makePanels = (actions) => {
     const box = element("input", { type: "checkbox", id, "data-name": effect.name, checked: true });
     const share = Math.round((100 * effect.operations) / total);
     const cost = effect.operations > 0 ? `${effect.operations} operations, ${share || "< 1"} %` : "no operations";
-    box.addEventListener("change", () => actions.parameter(effect.switch, box.checked ? 1 : 0));
+    const set = () => actions.parameter(effect.switch, box.checked ? 1 : 0);
+    box.dataset.switch = own[effect.switch].name;
+    box.setChecked = (checked) => {
+      box.checked = checked;
+      set();
+    };
+    box.addEventListener("change", set);
     const kind = effect.type === effect.name ? "" : `${effect.type.replace(/_/g, " ")} · `;
     const about = element("span", { class: "faint" }, ` ${kind}${cost}`);
     byId("effects").append(element("div", { class: "effect" }, box, element("label", { for: id }, effect.name, about)));
@@ -113,7 +119,10 @@ const makePanels = (actions) => {
       method.value = engine.method;
       step.value = plain(engine.dt * 1000);
     },
-    setParameter: (name, x) => parameterRows.find((row) => row.name === name)?.change(x),
+    setParameter(name, x) {
+      parameterRows.find((row) => row.name === name)?.change(x);
+      effectBoxes.find((box) => box.dataset.switch === name)?.setChecked(x !== 0);
+    },
     setInput: (name, x) => inputRows.find((row) => row.name === name)?.change(x),
   };
 };

@@ -21,7 +21,7 @@ const player = (() => {
   const canvas = byId("stage");
   const stage = makeStage(canvas, mechanism);
   const replay = makeReplay(mechanism);
-  const values = makeValues();
+  const values = makeValues((index, value) => begin((y) => engine.lead(y, index, value)));
   const slider = byId("time");
   const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
   const clock = {
@@ -223,6 +223,27 @@ const player = (() => {
     return true;
   }
 
+  // A live motion that stands at another state: the nearest one that constraints allow.
+  function begin(change, t = null) {
+    const now = current();
+    const y = Float64Array.from(now.y);
+    if (!isLive()) setMode("live");
+    setPlaying(false);
+    clock.seen = null;
+    try {
+      change(y);
+    } catch (error) {
+      say(`${error.message}`);
+      return;
+    }
+    engine.reset(y, t ?? now.t, true);
+    say(engine.error ?? "");
+    values.restart();
+    stage.clearTraces();
+    plotting.restart();
+    redraw();
+  }
+
   const panels = makePanels({
     parameter(index, value) {
       if (!goLive()) return;
@@ -319,6 +340,50 @@ const player = (() => {
   listenToPrinting(stage, plotting.plots);
   listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
   byId("modes").hidden = !DATA.live || !replay;
+  // The address of the page as it is now.
+  function address() {
+    const { t, y, p, u } = current();
+    const setup = {
+      parameters: links.changed(DATA.parameters, p), inputs: links.changed(DATA.inputs, u), state: links.changed(DATA.states, y),
+      t, method: engine.method, dt: engine.dt, plots: plotting.plots.specs(),
+    };
+    return links.write(setup);
+  }
+
+  // The page as an address says. Returns whether it says anything.
+  function open(hash) {
+    const given = DATA.live && links.read(hash);
+    if (!given) return false;
+    setMode("live");
+    given.parameters.forEach((x, name) => panels.setParameter(name, x));
+    given.inputs.forEach((x, name) => panels.setInput(name, x));
+    if (given.method) engine.setMethod(engine.methods.some(({ name }) => name === given.method) ? given.method : engine.method, given.dt);
+    panels.showMethods(engine);
+    begin((y) => DATA.states.forEach(({ name }, k) => {
+      y[k] = given.state.get(name) ?? y[k];
+    }), given.t);
+    if (given.plots.length) plotting.restore(given.plots);
+    return true;
+  }
+  if (DATA.live) {
+    const link = byId("link");
+    link.addEventListener("click", async () => {
+      const { href } = new URL(address(), location.href);
+      let told = "A frame has no address";
+      try {
+        history.replaceState(null, "", href);
+        told = "It is in the address bar";
+        await navigator.clipboard.writeText(href);
+        told = "Copied";
+      } catch {
+        // not allowed here
+      }
+      link.textContent = told;
+      setTimeout(() => {
+        link.textContent = "Copy link";
+      }, 2000);
+    });
+  }
   say("");
   let warmed = 0;
   // While the run is replayed, the browser compiles the functions for the live motion.
@@ -342,7 +407,7 @@ const player = (() => {
   }
   setMode(clock.mode);
   new ResizeObserver(redraw).observe(canvas);
-  if (!matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
+  if (!open(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
   return { stage, clock, current, goTo, plotting, engine };
 })();
 

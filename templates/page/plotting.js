@@ -37,6 +37,11 @@ const makePlotting = ({ mechanism, replay, seek }) => {
     },
     cursor: (t) => plots.cursor(t),
     restart: () => plots.live(),
+    // Plots of what is known here, as `plots.specs` told them.
+    restore: (specs) => plots.show(specs
+      .filter(({ x }) => x === null || channels.get(x))
+      .map(({ x, y }) => ({ x, y: y.filter(channels.get) }))
+      .filter(({ y }) => y.length)),
     repaint: () => plots.refresh(),
     rowAt: (t) => plots.rowAt(t),
     plots,

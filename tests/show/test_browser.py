@@ -137,3 +137,36 @@ SVG = "{http://www.w3.org/2000/svg}"
 def corners(path: str) -> np.ndarray:
     """The corners of a path, (n, 2)."""
     return np.array([tuple(map(float, x.split(","))) for x in re.findall(r"[-\d.]+,[-\d.]+", path)])
+
+
+def test_a_state_is_typed_and_a_link_keeps_it(browser: Any, tmp_path: Path) -> None:
+    """The motion stands there; a link opens the same state, parameters, effects, method and plots.
+    What a link says of nothing that is known changes nothing.
+    """
+    run = eomgen.simulate("peaucellier", t_end=0.2, samples=11)
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as found:
+        page, start, free = found.page, np.array(found.state), len(run.model.coordinates)
+        page.locator("#values .field").first.fill(f"{start[0] + 0.01}")
+        page.locator("#values .field").first.press("Enter")
+        assert found.mode == "live" and not found.playing
+        moved = np.array(found.state) - start
+        assert moved[0] == pytest.approx(0.01, abs=1e-9) and np.abs(moved[1:free]).max() > 1e-3
+        page.locator("#parameters .field").last.fill("0.7")
+        page.locator("#parameters .field").last.press("Enter")
+        page.locator("#effects input").first.uncheck()
+        found.pause()
+        page.click("#link")
+        page.wait_for_function("location.hash.startsWith('#live=')")
+        kept = found.state, found.parameters, found.time, found.step["method"]
+        address = page.url
+        other = page.context.new_page()
+        for link in (address, page.url.split("#")[0] + "#live=%7B%22t%22:", address + "%7D"):
+            other.goto("about:blank")
+            other.goto(link)
+            shown = other.evaluate(
+                "[eomgen.state, eomgen.parameters, eomgen.time, eomgen.step.method, eomgen.mode]"
+            )
+            same = np.allclose(shown[0], kept[0], rtol=0, atol=1e-12) and shown[1] == kept[1]
+            assert same == (link == address), link
+        other.close()
