@@ -78,18 +78,12 @@ def _mechanism(equations: Equations) -> Iterator[Titled]:
         "joint forces. What the joints say of the accelerations is missing.",
         list(equations.free_bodies.equations),
     )
-    arms = []
-    for k in held:
-        name = model.bodies[k].joint.name
-        for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
-            for axis, component in zip("xy", arm, strict=True):
-                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
     yield (
         "(18), (19)",
         "joint",
         "Arms",
         "From each centre of mass to the joint, in world axes.",
-        arms,
+        [pair for k in held for pair in _arms(equations, k)],
     )
     yield (
         "(20), (21)",
@@ -105,12 +99,21 @@ def _mechanism(equations: Equations) -> Iterator[Titled]:
         "Constraint differentiated twice",
         "The child's acceleration, from the parent's and from the angular velocities and "
         "accelerations.",
-        [
-            pair
-            for k in held
-            for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
-        ],
+        [pair for k in held for pair in _accelerated(equations, k)],
     )
+
+
+def _arms(equations: Equations, k: int) -> Iterator[tuple[Expr, Expr]]:
+    """From the centres of mass to the joint of a body."""
+    name, kin = equations.model.bodies[k].joint.name, equations.kinematics
+    for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
+        for axis, component in zip("xy", arm, strict=True):
+            yield sp.Symbol(f"r_{name},{word},{axis}"), component
+
+
+def _accelerated(equations: Equations, k: int) -> Iterator[tuple[Expr, Expr]]:
+    s = equations.symbols
+    return zip((s.xdd[k], s.ydd[k]), equations.kinematics.acceleration[k], strict=True)
 
 
 def _count(n: int) -> str:

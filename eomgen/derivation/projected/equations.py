@@ -5,7 +5,7 @@ The partial velocity of a body for v_j is its velocity for v_j = 1 and all other
 inertial forces and loads in them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -150,27 +150,8 @@ def body_motions(
     for k, (body, first, c) in enumerate(starts):
         name = body.name
         parent = found[body.parent] if body.parent >= 0 else ground
-        partial_omegas: dict[int, Expr] = {}
-        partial_velocities: dict[int, Expr] = {}
         own = range(first, first + len(body.velocities))
-        for j in dict.fromkeys((*parent.partial_omegas, *parent.partial_velocities, *own)):
-            none = sp.zeros(3, 1)
-            unit = {v: sp.Integer(int(i == j)) for i, v in enumerate(symbols.v)}
-            given = unit | _by(
-                c.parent, parent.partial_omegas.get(j, none), parent.partial_velocities.get(j, none)
-            )
-            of = symbols.v[j].name
-            partial_omega = ledger.vector(
-                f"turn__{of}", name, ledger.short(c.omega.xreplace(given))
-            )
-            given |= dict(zip(c.own.omega, partial_omega, strict=True))
-            partial_velocity = ledger.vector(
-                f"move__{of}", name, ledger.short(c.velocity.xreplace(given))
-            )
-            if any(partial_omega):
-                partial_omegas[j] = partial_omega
-            if any(partial_velocity):
-                partial_velocities[j] = partial_velocity
+        partial_omegas, partial_velocities = _partials(c, parent, own, name, ledger, symbols)
         given = still | dict(zip(c.parent.omega, parent.omega, strict=True))
         given |= dict(zip(c.parent.alpha, parent.alpha, strict=True))
         given |= dict(zip(c.parent.acceleration, parent.acceleration, strict=True))
@@ -194,6 +175,27 @@ def body_motions(
             )
         )
     return tuple(found)
+
+
+def _partials(
+    c: Constraint, parent: Motion, own: Iterable[int], name: str, ledger: Ledger, symbols: Symbols
+) -> tuple[dict[int, Expr], dict[int, Expr]]:
+    """The partial velocities of a body, by velocity: those of its parent's motion and its own."""
+    omegas: dict[int, Expr] = {}
+    velocities: dict[int, Expr] = {}
+    none = sp.zeros(3, 1)
+    for j in dict.fromkeys((*parent.partial_omegas, *parent.partial_velocities, *own)):
+        unit = {v: sp.Integer(int(i == j)) for i, v in enumerate(symbols.v)}
+        moving = parent.partial_omegas.get(j, none), parent.partial_velocities.get(j, none)
+        given, of = unit | _by(c.parent, *moving), symbols.v[j].name
+        omega = ledger.vector(f"turn__{of}", name, ledger.short(c.omega.xreplace(given)))
+        given |= dict(zip(c.own.omega, omega, strict=True))
+        velocity = ledger.vector(f"move__{of}", name, ledger.short(c.velocity.xreplace(given)))
+        if any(omega):
+            omegas[j] = omega
+        if any(velocity):
+            velocities[j] = velocity
+    return omegas, velocities
 
 
 def _by(moving: MotionSymbols, partial_omega: Expr, partial_velocity: Expr) -> dict[Expr, Expr]:
