@@ -9,8 +9,8 @@ from typing import Any
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.loops import constraints
 from eomgen.dynamics.loops.clusters import jacobian_of
-from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.model.model import Model
+from eomgen.model.named import Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.extended import MP, Digits
 from eomgen.scalars.protocol import Scalars

@@ -12,8 +12,8 @@ from eomgen.dynamics.orthogonal.mixed import well_conditioned
 from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.dynamics.start.walks import with_safe_pivots
 from eomgen.dynamics.tree.linkage import make_linkage
-from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.model.model import Model
+from eomgen.model.named import Values
 from eomgen.program.passes import optimise
 from eomgen.program.program import Program, cost, interpreter
 from eomgen.program.tape import TIME

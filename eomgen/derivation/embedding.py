@@ -23,9 +23,10 @@ from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr, of_scene, real
 from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
-from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
+from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.model.groups import Group
 from eomgen.model.model import Model
+from eomgen.model.named import Values
 
 SHORT = 8
 """The size of a ratio or a coordinate up to which it has no name of its own."""

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
 
 import sympy as sp
 
@@ -16,12 +15,10 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr, names_of_scene, of_scene, real
-from eomgen.language.formula import Formula, evaluate
-from eomgen.model.model import Model, dofs_of
-from eomgen.model.partials import gradient_of, partials_of
-from eomgen.scalars.exact import Real
+from eomgen.language.formula import Formula
+from eomgen.model.model import Model
+from eomgen.model.named import NamedModel
 from eomgen.scalars.protocol import Scalars
-from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
@@ -51,7 +48,7 @@ class Notes:
         return f"{self.suffix}{number}"
 
 
-class SymbolicMechanism:
+class SymbolicMechanism(NamedModel):
     """A model over symbols, as effects see it that use joints and inputs alone: see
     `scene.effects.base.Mechanism`.
 
@@ -68,68 +65,19 @@ class SymbolicMechanism:
         formulas: Mapping[Formula, Expr] = MappingProxyType({}),
         heights: Iterable[Expr] = (),
     ) -> None:
-        self.model, self.names = model, dict(names)
-        self._scalars, self._formulas = scalars, formulas
-        self._heights = tuple(heights)
-        self.dimensions = model.dimensions
-        self.magnitude = model.magnitude
-        self.bodies = tuple(body.name for body in model.bodies)
-        self.masses = {body.name: body.mass for body in model.bodies}
-        self.zero = scalars.number(0.0)
-        self.joints = dofs_of(model.bodies, model.dimensions)
-        self._by_joint = {body.joint.name: body for body in model.bodies}
+        super().__init__(model, scalars)
+        self.names = dict(names)
+        self._formulas, self._heights = formulas, tuple(heights)
 
     def height(self, body: str) -> Expr:
         """World y or z of a body's centre of mass."""
         return self._heights[self.bodies.index(body)]
 
-    def coordinate(self, joint: str, index: int = 0) -> Expr:
-        """A coordinate of a joint."""
-        return self.names[self.coordinate_name(joint, index)]
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Its name."""
-        return self._by_joint[joint].positions[index].name
-
-    def rate(self, joint: str, index: int = 0) -> Expr:
-        """A velocity of a joint."""
-        return self.names[self._by_joint[joint].velocities[index].name]
-
     def value(self, formula: Formula, **names: Expr) -> Expr:
         """A quantity over the names of the scene."""
         if formula in self._formulas:
             return self._formulas[formula]
-        return evaluate(formula, {**self.names, **names}, self._scalars)
-
-    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
-        """A formula with its derivatives."""
-        return partials_of(formula, by, self.model, self.names, self._scalars)
-
-    def gradient(
-        self, formula: Formula, names: Mapping[str, Expr]
-    ) -> tuple[Expr, tuple[Expr, ...], Expr]:
-        """A formula of `names`, t and parameters with its derivatives."""
-        return gradient_of(formula, names, self.names, self._scalars)
-
-    def input(self, name: str) -> Expr:
-        """An input."""
-        return self.names[name]
-
-    def state(self, name: str) -> Expr:
-        """An extra state."""
-        return self.names[name]
-
-    def number(self, value: Real) -> Expr:
-        """A number."""
-        return self._scalars.number(value)
-
-    def call(self, function: str, *arguments: Expr) -> Expr:
-        """A function of formulas."""
-        return self._scalars.call(function, *arguments)
-
-    def called(self, letter: str, *values: Expr) -> Vector:
-        """The values themselves."""
-        return values
+        return super().value(formula, **names)
 
 
 class NamingMechanism(SymbolicMechanism):
@@ -150,10 +98,9 @@ class NamingMechanism(SymbolicMechanism):
 
     def point(self, name: str) -> tuple[str, Vector]:
         """A named point: its body, and where on it."""
-        point = next(point for point in self.model.points if point.name == name)
-        at = tuple(self.value(part) for part in point.at)
-        self._points[self.bodies[point.body], at] = name
-        return self.bodies[point.body], at
+        body, at = super().point(name)
+        self._points[body, at] = name
+        return body, at
 
     def position(self, body: str, at: Vector) -> Vector:
         """World position of a point of a body: symbols, defined by the body's pose."""

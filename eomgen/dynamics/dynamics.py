@@ -38,7 +38,6 @@ from eomgen.dynamics.tree.composite import (
 from eomgen.dynamics.tree.frames import Linkage
 from eomgen.dynamics.tree.kinematics import TreeKinematics
 from eomgen.dynamics.tree.linkage import make_linkage
-from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.dynamics.tree.motion import (
     Acceleration,
     Twist,
@@ -48,6 +47,7 @@ from eomgen.dynamics.tree.motion import (
 )
 from eomgen.dynamics.tree.solids import Solid, centres, ranked, solids
 from eomgen.dynamics.tree.vectors import no_matrix, sub, zeros
+from eomgen.model.named import Values
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Effect

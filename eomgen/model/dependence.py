@@ -3,10 +3,12 @@ nothing but what they were computed from.
 """
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any
 
-from eomgen.language.formula import Formula, names_in
-from eomgen.model.model import Model, dofs_of
+from eomgen.model.model import Model
+from eomgen.model.named import NamedModel
+from eomgen.scalars.protocol import Scalars
 from eomgen.scene.effects.base import EffectTable, JointLoad, Vector
 
 
@@ -33,19 +35,29 @@ def sources_of(values: Iterable[Any]) -> frozenset[str]:
     return frozenset(s for value in values for s in getattr(value, "sources", ()))
 
 
-class _Tracing:
-    """A model as effects see it, over such scalars: see `scene.effects.base.Mechanism`."""
+class _Tracing(Scalars):
+    """Such scalars."""
 
-    def __init__(self, model: Model) -> None:
-        self.dimensions, self.magnitude = model.dimensions, model.magnitude
-        self.bodies = tuple(body.name for body in model.bodies)
-        self.masses, self.zero = {body.name: body.mass for body in model.bodies}, Traced()
-        self.joints = dofs_of(model.bodies, model.dimensions)
-        self._positions = {body.joint.name: body.positions for body in model.bodies}
-        self._points = {point.name: point.body for point in model.points}
-        moving = ("t", *(c.name for c in (*model.coordinates, *model.velocities)))
-        self._names = dict.fromkeys(moving, Traced("joint"))
-        self._names |= {state.name: Traced("state") for state in model.extra}
+    def number(self, value: object) -> Traced:
+        return Traced()
+
+    def call(self, function: str, *arguments: Any) -> Traced:
+        return Traced(*sources_of(arguments))
+
+
+class _Traced(NamedModel):
+    """A model over such scalars."""
+
+    @cached_property
+    def names(self) -> dict[str, Traced]:
+        model = self.model
+        fixed = [*(p.name for p in model.parameters), *(i.name for i in model.inputs)]
+        moving = ("t", *(c.name for b in model.bodies for c in (*b.positions, *b.velocities)))
+        return {
+            **dict.fromkeys(fixed, Traced()),
+            **dict.fromkeys(moving, Traced("joint")),
+            **{state.name: Traced("state") for state in model.extra},
+        }
 
     def height(self, body: str) -> Traced:
         return Traced("height")
@@ -56,37 +68,11 @@ class _Tracing:
     velocity = outward = position
 
     def point(self, name: str) -> tuple[str, Vector]:
-        return self.bodies[self._points[name]], (Traced("body"),) * self.dimensions
+        body, _ = super().point(name)
+        return body, (Traced("body"),) * self.dimensions
 
     def angular_velocity(self, body: str) -> Vector:
         return (Traced("body"),) * (1 if self.dimensions == 2 else 3)
-
-    def coordinate(self, joint: str, index: int = 0) -> Traced:
-        return Traced("joint")
-
-    rate = coordinate
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        return self._positions[joint][index].name
-
-    def value(self, formula: Formula, **names: Any) -> Traced:
-        known = {**self._names, **names}
-        return Traced(*sources_of(known.get(name) for name in names_in(formula)))
-
-    def input(self, name: str) -> Traced:
-        return Traced()
-
-    def number(self, value: object) -> Traced:
-        return Traced()
-
-    def state(self, name: str) -> Traced:
-        return Traced("state")
-
-    def call(self, function: str, *arguments: Any) -> Traced:
-        return Traced(*sources_of(arguments))
-
-    def called(self, letter: str, *values: Any) -> Vector:
-        return values
 
 
 def is_plain(effect: EffectTable, model: Model) -> bool:
@@ -94,7 +80,7 @@ def is_plain(effect: EffectTable, model: Model) -> bool:
     inputs alone, those at joints also on coordinates, rates and time, its energy on these and on
     heights. It has neither states nor rigid contacts.
     """
-    mechanism: Any = _Tracing(model)
+    mechanism = _Traced(model, _Tracing())
     if effect.states(model.dimensions) or effect.contacts(mechanism):
         return False
     at_joints, on_bodies = list[Any](), list[Any]()

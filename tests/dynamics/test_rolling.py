@@ -19,9 +19,10 @@ from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices
 from eomgen.base.errors import SceneError
 from eomgen.dynamics.loops import constraints
 from eomgen.dynamics.start.assembly import assembled
-from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
+from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.model.named import Values
 from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module

@@ -13,10 +13,11 @@ from eomgen.dynamics.tree.articulated import along
 from eomgen.dynamics.tree.forces import at_parent
 from eomgen.dynamics.tree.kinematics import Link
 from eomgen.dynamics.tree.loads import power_of, wrench_of
-from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
+from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.dynamics.tree.motion import Acceleration, Twist, accelerations, velocities
 from eomgen.dynamics.tree.observables import arm
 from eomgen.dynamics.tree.vectors import add, in_space, sub, times, zeros
+from eomgen.model.named import Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints import LoopJoint, Row

@@ -13,8 +13,8 @@ from eomgen.dynamics.loops import constraints
 from eomgen.dynamics.loops.clusters import jacobian_of
 from eomgen.dynamics.tree.frames import Linkage
 from eomgen.dynamics.tree.linkage import make_linkage
-from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.model.model import Model
+from eomgen.model.named import Values
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import Stage, Tape

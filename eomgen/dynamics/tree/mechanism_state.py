@@ -1,9 +1,6 @@
 """A mechanism at a state, over any scalars: what effects may ask of it (effects.base.Mechanism)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 from eomgen.dynamics.tree.frames import Linkage
 from eomgen.dynamics.tree.kinematics import Axes, TreeKinematics, tree_kinematics
@@ -17,36 +14,20 @@ from eomgen.dynamics.tree.observables import (
     velocity,
 )
 from eomgen.dynamics.tree.vectors import Vec, in_space, times, zeros
-from eomgen.language.formula import Formula, evaluate, names_in
+from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.model import JointIndex, Model, dofs_of
-from eomgen.model.partials import gradient_of, partials_of
-from eomgen.scalars.exact import Real
+from eomgen.model.model import Model
+from eomgen.model.named import NamedModel, Values
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.constraints.base import Partials, Row
+from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
 
-@dataclass(frozen=True)
-class Values:
-    """Values of all that a model leaves open: parameters, inputs and extra states by name, q and v
-    of the state in order, and the time, s.
-    """
-
-    parameters: Mapping[str, Scalar]
-    inputs: Mapping[str, Scalar]
-    q: Sequence[Scalar]
-    v: Sequence[Scalar]
-    states: Mapping[str, Scalar] = field(default_factory=dict)
-    time: Scalar = 0.0
-
-
-class MechanismState:
+class MechanismState(NamedModel):
     """The kinematics of a model at given values, for effects and recursions.
 
-    Each property is computed once, when it is first used. `nv` is the number of velocities of the
-    state, `moved` the number of these and the driven ones. A `linkage` over the same parameters may
+    Each property is computed once, when it is first used. A `linkage` over the same parameters may
     be passed for reuse.
     """
 
@@ -58,24 +39,12 @@ class MechanismState:
         axes: Axes | None = None,
         linkage: Linkage | None = None,
     ) -> None:
-        self.model = model
+        super().__init__(model, scalars)
         self.values = values
-        self.scalars = scalars
         self.axes: Axes = axes or ("world" if model.dimensions == 2 else "own")
-        self.dimensions = model.dimensions
-        self.bodies = tuple(body.name for body in model.bodies)
-        self.masses = {body.name: body.mass for body in model.bodies}
-        self.zero = scalars.number(0.0)
-        self.nv = len(model.velocities)
-        self.moved = self.nv + len(model.driven)
         self._linkage = linkage
 
     # What effects may ask (effects.base.Mechanism).
-
-    @cached_property
-    def joints(self) -> dict[str, tuple[str, ...]]:
-        """The joints that move but the free ones, each with the kinds of its primitives."""
-        return dofs_of(self.model.bodies, self.dimensions)
 
     def height(self, body: str) -> Scalar:
         """World y of a body's centre of mass in the plane, z in space, m."""
@@ -86,16 +55,6 @@ class MechanismState:
         return self._cut(
             at if body == WORLD else self.point_position(self.index[body], self._in_space(at))
         )
-
-    @property
-    def magnitude(self) -> float:
-        """The order of magnitude of its lengths, m."""
-        return self.model.magnitude
-
-    def point(self, name: str) -> tuple[str, Vector]:
-        """A named point: its body, and where on it, m."""
-        point = next(point for point in self.model.points if point.name == name)
-        return self.bodies[point.body], tuple(self.value(part) for part in point.at)
 
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of a point of a body, m/s."""
@@ -121,77 +80,10 @@ class MechanismState:
         )
         return self._cut(rotated)
 
-    def coordinate(self, joint: str, index: int = 0) -> Scalar:
-        """A coordinate of a joint."""
-        return self.q[self.joint_indices[joint].q[index]]
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Its name."""
-        return self.joint_indices[joint].body.positions[index].name
-
-    def rate(self, joint: str, index: int = 0) -> Scalar:
-        """A velocity of a joint."""
-        return self.v[self.joint_indices[joint].v[index]]
-
-    def value(self, formula: Formula, **names: Scalar) -> Scalar:
-        """A quantity."""
-        return evaluate(formula, {**self.names, **names} if names else self.names, self.scalars)
-
-    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
-        """A formula with its derivatives, by dual numbers along one coordinate at a time."""
-        return partials_of(formula, by, self.model, self.names, self.scalars)
-
-    def gradient(
-        self, formula: Formula, names: Mapping[str, Scalar]
-    ) -> tuple[Scalar, Vector, Scalar]:
-        """A formula of `names`, t and parameters with its derivatives by the names and by t."""
-        given = {**self.values.parameters, "t": self.values.time}
-        return gradient_of(formula, names, given, self.scalars)
-
-    def input(self, name: str) -> Scalar:
-        """An input."""
-        return self.values.inputs[name]
-
-    def state(self, name: str) -> Scalar:
-        """An extra state."""
-        return self.values.states[name]
-
-    def number(self, value: Real) -> Scalar:
-        """A number."""
-        return self.scalars.number(value)
-
-    def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """A function of formulas."""
-        return self.scalars.call(function, *arguments)
-
-    def called(self, letter: str, *values: Scalar) -> Vector:
-        """The values themselves."""
-        return values
-
     @cached_property
     def names(self) -> dict[str, Scalar]:
         """The values of all names that formulas may use."""
-        model, values = self.model, self.values
-        positions = (*model.coordinates, *(c.position for c in model.prescribed))
-        velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
-        return {
-            "t": values.time,
-            **values.inputs,
-            **values.states,
-            **{c.name: x for c, x in zip(positions, self.q, strict=True)},
-            **{c.name: x for c, x in zip(velocities, self.v, strict=True)},
-            **values.parameters,
-        }
-
-    @cached_property
-    def index(self) -> dict[str, int]:
-        """Index of each body by its name."""
-        return {name: k for k, name in enumerate(self.bodies)}
-
-    @cached_property
-    def joint_indices(self) -> dict[str, JointIndex]:
-        """Indices of each joint's coordinates and velocities, by its name."""
-        return {index.body.joint.name: index for index in self.model.joint_indices}
+        return self.values.by_name(self.model, self.q, self.v)
 
     @cached_property
     def given(self) -> list[tuple[Scalar, Scalar, Scalar]]:

@@ -11,7 +11,8 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate, names_in
-from eomgen.model.model import JointIndex, Model, dofs_of
+from eomgen.model.model import JointIndex, Model
+from eomgen.model.named import NamedModel, Values
 from eomgen.model.orientation import rows_of
 from eomgen.scalars.extended import Bits
 from eomgen.scene.constraints.base import Partials
@@ -40,7 +41,7 @@ _JUMP = 1e-30
 there is a jump."""
 
 
-class EvaluatedModel:
+class EvaluatedModel(NamedModel):
     """A model at a time and a state y = [q, v, x] of form 'velocity'. Quantities are computed on
     demand, and only within `extended_digits()`.
 
@@ -57,42 +58,27 @@ class EvaluatedModel:
         inputs: Mapping[str, Any] | None = None,
         parameters: Mapping[str, Any] | None = None,
     ) -> None:
-        self.model = model
-        self.dimensions = model.dimensions
-        self.scalars = Bits()
-        self.bodies = tuple(body.name for body in model.bodies)
-        self.masses = {body.name: body.mass for body in model.bodies}
-        self.zero = self.scalars.number(0.0)
-        self.nv = len(model.velocities)
-        self.moved = self.nv + len(model.driven)
-        self._parameters = _all_extended({**model.defaults, **(parameters or {})})
-        nothing = dict.fromkeys((i.name for i in model.inputs), 0.0)
-        self._inputs = _all_extended({**nothing, **(inputs or {})})
-        self._time = mpfr(t)
+        super().__init__(model, Bits())
         y, nq = extended(y), len(model.coordinates)
+        nothing = dict.fromkeys((i.name for i in model.inputs), 0.0)
+        own = (x.name for x in model.extra)
+        self.values = Values(
+            _all_extended({**model.defaults, **(parameters or {})}),
+            _all_extended({**nothing, **(inputs or {})}),
+            y[:nq],
+            y[nq : nq + self.nv],
+            dict(zip(own, y[nq + self.nv :], strict=True)),
+            mpfr(t),
+        )
         given = [self._prescribed(c.value) for c in model.prescribed]
         for n, c in enumerate(model.prescribed):
             if (degrees := dict(model.locked_deg).get(c.position.name)) is not None:
                 given[n] = (mpfr(degrees) * gmpy2.const_pi() / 180, *given[n][1:])
-        self.q: list[Extended] = [*y[:nq], *(x for x, _, _ in given)]
-        self.v: list[Extended] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
+        self.q: list[Extended] = [*self.values.q, *(x for x, _, _ in given)]
+        self.v: list[Extended] = [*self.values.v, *(v for _, v, _ in given)]
         self.driven_rates = extended([a for _, _, a in given[: len(model.driven)]])
-        names = (x.name for x in model.extra)
-        self._states = dict(zip(names, y[nq + self.nv :], strict=True))
-        self.index = {name: k for k, name in enumerate(self.bodies)}
-        self.joint_indices = {index.body.joint.name: index for index in model.joint_indices}
 
     # What effects may ask for.
-
-    @property
-    def magnitude(self) -> float:
-        """The order of magnitude of its lengths, m."""
-        return self.model.magnitude
-
-    @property
-    def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """The joints that move, except free ones, each with the kinds of its degrees of freedom."""
-        return dofs_of(self.model.bodies, self.dimensions)
 
     def mass(self, body: str) -> Extended:
         """Mass of a body, kg."""
@@ -108,11 +94,6 @@ class EvaluatedModel:
             return at
         pose = self.poses[self.index[body]]
         return self._cut(pose.position + pose.rotation @ self.in_space(at))
-
-    def point(self, name: str) -> tuple[str, Vector]:
-        """A named point: its body, and its position in body axes, m."""
-        point = next(point for point in self.model.points if point.name == name)
-        return self.bodies[point.body], tuple(self.value(part) for part in point.at)
 
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of a point of a body, m/s."""
@@ -133,45 +114,9 @@ class EvaluatedModel:
             return vector
         return self._cut(self.poses[self.index[body]].rotation @ self.in_space(vector))
 
-    def coordinate(self, joint: str, index: int = 0) -> Extended:
-        """A coordinate of a joint."""
-        return self.q[self.joint_indices[joint].q[index]]
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """The name of a coordinate of a joint."""
-        return self.joint_indices[joint].body.positions[index].name
-
-    def rate(self, joint: str, index: int = 0) -> Extended:
-        """A velocity of a joint."""
-        return self.v[self.joint_indices[joint].v[index]]
-
-    def value(self, formula: Formula, **names: Extended) -> Extended:
-        """The value of a formula."""
-        return evaluate(formula, {**self._names, **names} if names else self._names, self.scalars)
-
-    def input(self, name: str) -> Extended:
-        """The value of an input."""
-        return self._inputs[name]
-
-    def state(self, name: str) -> Extended:
-        """The value of an extra state."""
-        return self._states[name]
-
-    def number(self, value: Any) -> Extended:
-        """A number in extended precision."""
-        return self.scalars.number(value)
-
-    def call(self, function: str, *arguments: Extended) -> Extended:
-        """The value of a function of formulas."""
-        return self.scalars.call(function, *arguments)
-
-    def called(self, letter: str, *values: Extended) -> Vector:
-        """The values themselves."""
-        return values
-
     def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
         """A formula with its derivatives, by central differences."""
-        names, used = self._names, set(names_in(formula))
+        names, used = self.names, set(names_in(formula))
 
         def slope(name: str) -> Extended:
             x = names[name]
@@ -194,7 +139,7 @@ class EvaluatedModel:
         self, formula: Formula, names: Mapping[str, Extended]
     ) -> tuple[Extended, tuple[Extended, ...], Extended]:
         """A formula of `names`, t and parameters with its derivatives, by central differences."""
-        values = {**self._parameters, "t": self._time, **names}
+        values = {**self.values.parameters, "t": self.values.time, **names}
 
         def slope(name: str) -> Extended:
             ahead, behind = (
@@ -206,27 +151,17 @@ class EvaluatedModel:
         return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
 
     @cached_property
-    def _names(self) -> dict[str, Extended]:
-        model = self.model
-        positions = (*model.coordinates, *(c.position for c in model.prescribed))
-        velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
-        return {
-            "t": self._time,
-            **self._inputs,
-            **self._states,
-            **{c.name: x for c, x in zip(positions, self.q, strict=True)},
-            **{c.name: v for c, v in zip(velocities, self.v, strict=True)},
-            **self._parameters,
-        }
+    def names(self) -> dict[str, Extended]:
+        """The values of all names that formulas may use."""
+        return self.values.by_name(self.model, self.q, self.v)
 
     def _prescribed(self, formula: Formula) -> tuple[Extended, Extended, Extended]:
         """Value, rate and acceleration of a formula of time; the last two are nan at a corner."""
         h = _INSTANT
         with gmpy2.context(precision=_BITS):
-            x = [
-                evaluate(formula, {**self._parameters, "t": self._time + k * h}, self.scalars)
-                for k in range(-2, 3)
-            ]
+            names = dict(self.values.parameters)
+            times = (self.values.time + k * h for k in range(-2, 3))
+            x = [evaluate(formula, {**names, "t": time}, self.scalars) for time in times]
             rate = (x[3] - x[1]) / (2 * h)
             behind, here, ahead = (
                 (a - 2 * b + c) / (h * h) for a, b, c in zip(x, x[1:], x[2:], strict=False)

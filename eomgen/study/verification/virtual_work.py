@@ -268,8 +268,9 @@ class FreeBodies(EvaluatedModel):
         nq = len(self.model.coordinates)
         q = extended(self.q[:nq])
         q = q + step * self._position_rates(q) + step**2 / 2 * self._bends(q)
-        y = [*q, *self.v[: self.nv], *self._states.values()]
-        return FreeBodies(self.model, self._time + step, y, self._inputs, self._parameters)
+        given = self.values
+        y = [*q, *given.v, *given.states.values()]
+        return FreeBodies(self.model, given.time + step, y, given.inputs, given.parameters)
 
     def _bends(self, q: Array) -> Array:
         """q̈ at constant velocities: of quaternions alone."""
