@@ -6,7 +6,8 @@ from typing import Any
 
 from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Table
-from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, meant, names_in
+from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, meant, names_in
+from eomgen.language.rewriting import with_names
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Scene
 
@@ -66,7 +67,7 @@ def _expanded_definitions(definitions: Mapping[str, Formula]) -> dict[str, Formu
             missing = next((n for n in used if n not in expanded), None)
             if missing is None:
                 path.pop()
-                expanded[name] = _substituted(definitions[name], expanded)
+                expanded[name] = with_names(definitions[name], expanded)
                 _check_size(expanded[name], name)
             elif missing in path:
                 cycle = [*path[path.index(missing) :], missing]
@@ -77,15 +78,6 @@ def _expanded_definitions(definitions: Mapping[str, Formula]) -> dict[str, Formu
             else:
                 path.append(missing)
     return expanded
-
-
-def _substituted(formula: Formula, replacements: Mapping[str, Formula]) -> Formula:
-    match formula:
-        case Name(name):
-            return replacements.get(name, formula)
-        case Apply(operation, operands):
-            return Apply(operation, tuple(_substituted(part, replacements) for part in operands))
-    return formula
 
 
 def _check_size(formula: Formula, name: str) -> None:
@@ -132,7 +124,7 @@ def _expanded_table(
                         f"{at}: '{hidden[0]}' of definition '{name}' is predefined here; "
                         "rename it where it is defined"
                     )
-            return _substituted(value, expanded)
+            return with_names(value, expanded)
 
         value = getattr(table, field)
         expanded_value = expand(value, f"{location}.{info.alias or field}")

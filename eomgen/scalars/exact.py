@@ -20,7 +20,7 @@ from gmpy2 import mpfr
 BITS = 1280
 Real = Any
 """An `mpfr` of `BITS` bits, which has no type for type checkers."""
-Matrix = tuple[tuple[Real, Real, Real], ...]
+Matrix = tuple[tuple[Real, Real, Real], tuple[Real, Real, Real], tuple[Real, Real, Real]]
 """A rotation: three rows."""
 SMALLEST = mpfr(2) ** -1074
 """The smallest double; smaller numbers count as 0."""

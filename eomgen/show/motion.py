@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError
 from eomgen.base.frozen import Frozen
+from eomgen.run.poses import places_of, world_points
 from eomgen.scene.look import BARE, Shape, numbers
 from eomgen.show.framing import Framing, View
-from eomgen.show.of_run import world_points
 from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
@@ -108,7 +108,7 @@ class Motion(Frozen):
     @property
     def places(self) -> Array:
         """World positions (n, nb, 2) or (n, nb, 3) of the centres of mass, m."""
-        return self.poses[..., :2] if self.dimensions == 2 else self.poses[..., 3]
+        return places_of(self.poses)
 
     @property
     def traced(self) -> tuple[int, ...]:

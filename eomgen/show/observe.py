@@ -8,11 +8,12 @@ import numpy as np
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
+from eomgen.run.poses import world_points
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.effects import elements
-from eomgen.scene.joints.base import WORLD, Primitive
+from eomgen.scene.joints.base import Primitive
 from eomgen.scene.look import number, numbers
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.framing import Framing
@@ -108,8 +109,7 @@ def joint_drift(model: Model, poses: FloatArray) -> FloatArray:
     dimensions = poses.ndim - 1
 
     def point(body: str, r: Sequence[Formula]) -> FloatArray:
-        at = _values(model, r, dimensions)
-        return at if body == WORLD else _point(poses[:, names[body]], at)
+        return world_points(poses, names.get(body, -1), _values(model, r, dimensions))
 
     gaps = []
     for _, joint in _joints(model, _holds_a_point):
@@ -157,12 +157,3 @@ def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
 def _values(model: Model, r: Sequence[Formula], dimensions: int) -> FloatArray:
     """A vector of the scene as numbers; zero if the scene omits it."""
     return np.array([model.value(part) for part in r] if r else [0.0] * dimensions)
-
-
-def _point(poses: FloatArray, r: FloatArray) -> FloatArray:
-    """World position (n, 2) or (n, 3) of a point `r` of a body, given in body axes, m."""
-    if poses.ndim == 3:
-        return np.asarray(poses[..., :3] @ r + poses[..., 3])
-    x, y, angle = poses.T
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([x + c * r[0] - s * r[1], y + s * r[0] + c * r[1]], axis=-1)

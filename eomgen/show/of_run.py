@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant, Formula
 from eomgen.language.rewriting import constant
 from eomgen.model.model import Model
+from eomgen.run.poses import places_of, world_points
 from eomgen.scene.effects.elements import Attraction, Element, Field, Link, Round, Support, Wind
 from eomgen.scene.look import number, numbers
 from eomgen.show.arrows import field_arrows, region_of, wind_at
@@ -45,11 +46,6 @@ def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
         return replace(element, low=Constant(low), high=Constant(high))
 
     return replace(picture, elements=tuple(map(ranged, picture.elements)))
-
-
-def places_of(poses: Array) -> Array:
-    """The positions (n, nb, d) of centres of mass at poses, m."""
-    return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
 
 
 def spread(poses: Array) -> float:
@@ -111,15 +107,3 @@ def _way(picture: Picture, model: Model, poses: Array, rail: Support) -> Array:
     along = world_points(poses, rail.body, values(joint.at_parent) + values(rail.axis)) - start
     point = world_points(poses, joint.child, values(joint.at_child))
     return np.asarray(((point - start) * along).sum(axis=-1))
-
-
-def world_points(poses: Array, body: int, r: Array) -> Array:
-    """World positions (n, d) of a point `r` (d,) of a body, in body axes, m; -1 is the world."""
-    if body < 0:
-        return np.broadcast_to(r, (len(poses), len(r)))
-    pose = poses[:, body]
-    if poses.ndim == 4:
-        return np.asarray(pose[..., :3] @ r + pose[..., 3])
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    turned = np.stack([c * r[0] - s * r[1], s * r[0] + c * r[1]], axis=-1)
-    return np.asarray(pose[:, :2] + turned)

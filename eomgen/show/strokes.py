@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant, Formula
+from eomgen.run.poses import world_points
 from eomgen.scene.effects.elements import Attachment
 from eomgen.scene.look import number, numbers
 from eomgen.show.marks import Along, Arrows, Between, Facing, Mark, Turned, marks_of
-from eomgen.show.of_run import world_points
 from eomgen.show.picture import Picture
 from eomgen.show.symbols import Line, numbers_of
 

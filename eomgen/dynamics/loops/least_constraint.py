@@ -19,17 +19,16 @@ from eomgen.dynamics.loops.cluster_motion import motions
 from eomgen.dynamics.loops.clusters import Cluster
 from eomgen.dynamics.loops.constraints import inner, relative
 from eomgen.dynamics.loops.freedoms import Freedoms
+from eomgen.dynamics.orthogonal.inertia_rows import SLIGHT, inertia_rows
 from eomgen.dynamics.tree.forces import Wrench
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.dynamics.tree.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.tree.solids import Solid
-from eomgen.dynamics.tree.vectors import AXES, Vec, add, cross, dot, replaced, times, unit, zeros
+from eomgen.dynamics.tree.vectors import AXES, Vec, add, cross, dot, times, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 TINY = 1e-150
 """Added to the first of two numbers that are rotated: the rotation exists where both are 0."""
-SLIGHT = 1e-16
-"""A pivot of an inertia matrix is at least this part of its diagonal entry."""
 
 
 @dataclass(frozen=True)
@@ -225,26 +224,19 @@ class LeastConstraint(Freedoms):
                 right = force[j] / solid.mass - at[j]
                 found.append(BodyRow(scene.mass, root, k, zero, unit(j, s), right))
             force = zero
-        work = [list(row) for row in solid.inertia]
         size = dot(scene.centre, scene.centre) or 1.0
         order = [2] if planar else sorted(AXES, key=lambda i: -float(scene.inertia[i][i]))
-        for n, i in enumerate(order):
-            if s.is_zero(solid.inertia[i][i]):
-                continue
-            d = s.call("max", work[i][i], s.number(SLIGHT) * solid.inertia[i][i])
-            entries = unit(i, s)
-            for j in order[n + 1 :]:
-                part = work[i][j] / d
-                entries = replaced(entries, j, part)
-                y[j], moment[j] = y[j] - part * y[i], moment[j] - part * moment[i]
-                for h in order[n + 1 :]:
-                    work[j][h] = work[j][h] - part * work[i][h]
+        for i, d, entries in inertia_rows(solid.inertia, order, y, moment, self._bounded, s):
             root, right = s.call("sqrt", d), (y[i] + moment[i]) / d
             weight = float(scene.inertia[i][i]) / size
             found.append(BodyRow(weight, root, k, entries, zero, right))
             moment[i] = self._zero
         left = Wrench((moment[0], moment[1], moment[2]), force)
         return found, left
+
+    def _bounded(self, pivot: Scalar, entry: Scalar) -> Scalar:
+        s = self._scalars
+        return s.call("max", pivot, s.number(SLIGHT) * entry)
 
 
 def _along(row: BodyRow, motion: tuple[Vec, Vec], centre: Vec) -> Scalar:

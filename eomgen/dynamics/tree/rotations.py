@@ -16,7 +16,7 @@ from eomgen.dynamics.tree.vectors import (
 )
 from eomgen.language.formula import Formula
 from eomgen.model.orientation import turns_of
-from eomgen.scalars.exact import Matrix, axis_rotations
+from eomgen.scalars.exact import Matrix, axis_rotations, matrix
 from eomgen.scalars.protocol import Scalar, Scalars
 
 
@@ -99,7 +99,7 @@ class AxisRotation:
         m[i][j] = m[j][i] = self.c * w - a[i][j]
         m[k][i] = m[i][k] = edge[i]
         m[k][j] = m[j][k] = edge[j]
-        return _matrix(m)
+        return matrix(m)
 
     def out_matrix(self, a: Mat) -> Mat:
         """Like `out_symmetric`; the antisymmetric part of the block stays as it is."""
@@ -112,7 +112,7 @@ class AxisRotation:
         m[i][i], m[j][j] = a[i][i] - sw, a[j][j] + sw
         m[i][j], m[j][i] = cw - a[j][i], cw - a[i][j]
         m[k][i], m[k][j], m[i][k], m[j][k] = row[i], row[j], column[i], column[j]
-        return _matrix(m)
+        return matrix(m)
 
     def after(self, world: Mat) -> Mat:
         """Two columns rotate: each row of `world` times R."""
@@ -244,7 +244,7 @@ def held_rotation(
     """
     if len(rows) == 3:
         a, b, c = ([value(part) for part in row] for row in rows)
-        return MatrixRotation(_matrix([a, b, c]))
+        return MatrixRotation(matrix([a, b, c]))
     if len(rows[0]) == 4:
         return from_quaternion([value(part) for part in rows[0]], scalars)
     found: Rotation = IdentityRotation()
@@ -285,8 +285,3 @@ def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> MatrixRotation:
             (xz - wy, yz + wx, one - (xx + yy)),
         )
     )
-
-
-def _matrix(m: list[list[Scalar]]) -> Mat:
-    a, b, c = m
-    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))

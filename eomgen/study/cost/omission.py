@@ -18,6 +18,7 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.poses import places_of, rotations_of
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
@@ -131,7 +132,7 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
     apart = distances(model, one, two)
     moving = size > STILL
     late = np.flatnonzero(apart > SMALL * size) if moving else np.array([], dtype=int)
-    gaps = _positions(one) - _positions(two)
+    gaps = places_of(one) - places_of(two)
     gap = np.sqrt(np.sum(gaps * gaps, axis=-1))
     farthest = np.unravel_index(int(np.argmax(gap)), gap.shape)
     ends = [ended for ended in (other.ended, whole.ended) if ended not in ("", FAR_ENOUGH)]
@@ -149,8 +150,8 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
 def distances(model: Model, one: FloatArray, two: FloatArray) -> FloatArray:
     """The distance d between each row of two motions, (n,), m: root mean square over all mass."""
     total: FloatArray = np.zeros(len(one))
-    moved = np.sum((_positions(one) - _positions(two)) ** 2, axis=-1)
-    turned = _attitudes(one) - _attitudes(two)
+    moved = np.sum((places_of(one) - places_of(two)) ** 2, axis=-1)
+    turned = rotations_of(one) - rotations_of(two)
     masses = [model.value(body.mass) for body in model.bodies]
     for k, body in enumerate(model.bodies):
         inertia = [model.value(part) for part in body.inertia_com]
@@ -168,24 +169,11 @@ def _second_moment(inertia: Sequence[float]) -> FloatArray:
     return np.asarray(np.trace(matrix) / 2 * np.eye(3) - matrix)
 
 
-def _positions(poses: FloatArray) -> FloatArray:
-    """Centres of mass, (n, nb, 2) or (n, nb, 3)."""
-    return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
-
-
-def _attitudes(poses: FloatArray) -> FloatArray:
-    """Rotation matrices from body to world, (n, nb, 2, 2) or (n, nb, 3, 3)."""
-    if poses.ndim == 4:
-        return poses[..., :3]
-    c, s = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
-
-
 def _angles(one: FloatArray, two: FloatArray) -> FloatArray:
     """Angle between the two orientations of each body, 0 to π, (n, nb).
 
     In the plane and in space, |ΔR|² is 4 (1 - cos) or, what is the same, 8 sin²(½ angle).
     """
-    turned = _attitudes(one) - _attitudes(two)
+    turned = rotations_of(one) - rotations_of(two)
     half = np.sqrt(np.sum(turned * turned, axis=(-2, -1)) / 8)
     return np.asarray(2 * np.arcsin(np.minimum(half, 1.0)))
