@@ -22,7 +22,7 @@ Leaf to root, for each link:
 2. Rotate them to triangular form about one point (`Rows.folded`): first the columns of a, then
    those of α. The point is the joint of the heaviest child. An arm that is zero there stays zero.
 3. For each free motion axis, rotate the rows against each other until only one contains the
-   acceleration along that axis (`_eliminate_axis`): the pivot row (ρ, u | s). Keep it.
+   acceleration along that axis (`axis_elimination`): the pivot row (ρ, u | s). Keep it.
 4. Pass the other rows on to the parent: at most five for one degree of freedom in space, two in
    the plane.
 
@@ -48,9 +48,13 @@ where a heavy tip is in line with all joints, to less than the rounding of sines
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from eomgen.dynamics.orthogonal.aligned_axes import align_axes
+from eomgen.dynamics.orthogonal.axis_elimination import (
+    Others,
+    eliminate_aligned_rotation,
+    eliminate_free_axis,
+)
 from eomgen.dynamics.orthogonal.back_substitution import outwards
 from eomgen.dynamics.orthogonal.elimination_order import (
     column_of,
@@ -59,29 +63,25 @@ from eomgen.dynamics.orthogonal.elimination_order import (
     rotation_order,
     translation_order,
 )
+from eomgen.dynamics.orthogonal.inertia_rows import SLIGHT, inertia_rows
 from eomgen.dynamics.orthogonal.mixed import ArticulatedPart
 from eomgen.dynamics.orthogonal.rows import (
     Column,
-    EliminatedAxis,
     EliminatedLink,
-    GivensRotation,
     Row,
     Rows,
     Steps,
-    Sum,
     in_parent_axes,
     shifted,
 )
-from eomgen.dynamics.tree.articulated import along, with_component
 from eomgen.dynamics.tree.forces import (
     Wrench,
     at_parent,
     moved_to,
-    no_wrench,
     on_frames,
     total,
 )
-from eomgen.dynamics.tree.kinematics import Link, MotionAxis, TreeKinematics
+from eomgen.dynamics.tree.kinematics import TreeKinematics
 from eomgen.dynamics.tree.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.tree.solids import Ranks, Solid
 from eomgen.dynamics.tree.vectors import (
@@ -89,23 +89,12 @@ from eomgen.dynamics.tree.vectors import (
     Vec,
     add,
     replaced,
-    scale,
     sub,
     times,
     unit,
     zeros,
 )
 from eomgen.scalars.protocol import Scalar, Scalars
-
-SLIGHT = 1e-16
-"""A pivot of an inertia matrix is at least this part of its diagonal entry."""
-
-
-class _Others(NamedTuple):
-    """The rows beside a pivot row: those `kept` in a triangle, by column, and the `free` ones."""
-
-    kept: dict[Column, Row]
-    free: list[Row]
 
 
 class Elimination:
@@ -191,9 +180,6 @@ class Elimination:
         """The Newton-Euler rows of a link's own mass, by coordinate axis: linear ones about its
         centre, and angular ones. Also the part of the wrench along axes without inertia, about the
         link's origin.
-
-        The inertia about the centre is I = Σ d u uᵀ with triangular u (Cholesky's factors without
-        roots). Each u is a row of weight d.
         """
         s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
         linear, angular = dict[int, Row](), dict[int, Row]()
@@ -213,20 +199,9 @@ class Elimination:
                 for j in AXES[: 2 if self._planar else 3]:
                     linear[j] = row(m, zero, unit(j, s), -centre[j], wrench.force[j])
             y = [-x for x in into(moment_about_centre(own.inertia, a, s))]
-            work = [list(row) for row in solid.inertia]
             order = rotation_order(self._links[k], self._planar, self._aligned.along[k])
-            for n, i in enumerate(order):
-                if s.is_zero(solid.inertia[i][i]):
-                    continue
-                d = self._bounded_pivot(work[i][i], solid.inertia[i][i])
-                entries = unit(i, s)
-                for j in order[n + 1 :]:
-                    part = work[i][j] / d
-                    entries = replaced(entries, j, part)
-                    y[j], moment[j] = y[j] - part * y[i], moment[j] - part * moment[i]
-                    for h in order[n + 1 :]:
-                        work[j][h] = work[j][h] - part * work[i][h]
-                angular[i] = row(d, entries, zero, y[i] / d, moment[i])
+            for i, d, u in inertia_rows(solid.inertia, order, y, moment, self._bounded_pivot, s):
+                angular[i] = row(d, u, zero, y[i] / d, moment[i])
         # Where there is a row, its φ takes the force.
         for j in linear:
             wrench = replace(wrench, force=replaced(wrench.force, j, self._rows.zero))
@@ -268,8 +243,10 @@ class Elimination:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in translations if j in linear}
             kept |= {(True, j): angular[j] for j in order if j in angular}
-            every = _Others(kept, loose)
-            one, (kept, loose) = self._eliminate_aligned_rotation(link, axes.pop(0), every, at)
+            every = Others(kept, loose)
+            one, (kept, loose) = eliminate_aligned_rotation(
+                self._rows, link, axes.pop(0), every, at
+            )
             taken.append(one)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
@@ -286,34 +263,16 @@ class Elimination:
         free = [self._rows.of(columns, shifted(row, at)) for row in free]
         # Rows of angular accelerations alone come first, and stay free of linear ones.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
-        others = _Others(kept, free)
+        others = Others(kept, free)
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
-            one, others, term = self._eliminate_free_axis(link, axis, held, others, term, tau)
+            one, others, term = eliminate_free_axis(self._rows, link, axis, held, others, term, tau)
             taken.append(replace(one, before=tuple(rotations)))
             rotations.clear()
         rest = [*others.kept.values(), *others.free]
         empty = tuple(row for row in (*loose, *rest) if self._rows.is_empty(row))
         holding = tuple(row for row in rest if not self._rows.is_empty(row))
         return EliminatedLink(tuple(taken), tuple(rotations), holding, empty), term
-
-    def _eliminate_free_axis(
-        self,
-        link: Link,
-        axis: tuple[MotionAxis, int],
-        held: bool,
-        others: _Others,
-        term: Wrench,
-        tau: Sequence[Scalar],
-    ) -> tuple[EliminatedAxis, _Others, Wrench]:
-        """Choose the pivot row of a motion axis, and eliminate the axis from the other rows."""
-        first, sources, others, gathered = self._pivot_row(axis[0], held, others)
-        # The rows of rotors of several axes contain all of these.
-        early = len(link.free) > 1 and not self._scalars.is_zero(link.armature)
-        one, others, left = self._eliminate_axis(
-            link, axis, first, others, term, tau[axis[1]], early=early
-        )
-        return replace(one, rows=sources, gathered=gathered), others, left
 
     def _rows_about(
         self,
@@ -364,105 +323,7 @@ class Elimination:
             angular, loose = self._rows.folded(angular, loose, orders[1], rotations, angular=True)
         return linear, angular, loose
 
-    def _eliminate_aligned_rotation(
-        self,
-        link: Link,
-        axis: tuple[MotionAxis, int],
-        every: _Others,
-        at: Vec,
-    ) -> tuple[EliminatedAxis, _Others]:
-        """Eliminate the rotation about the arm from the rows about the arm's end `at`.
-
-        The heaviest rows do not contain it. Rows with other arms, rotated against them first, would
-        bring it in, and rounding would not remove it.
-        """
-        first, nothing = every.kept.pop(column_of(axis[0])), no_wrench(self._scalars)
-        # The forces along this axis are all on its own row.
-        one, others, _ = self._eliminate_axis(
-            link, axis, first, every, nothing, self._rows.zero, early=True
-        )
-        return replace(one, rows=(shifted(first, at),)), others
-
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of link k from the point `at`, the joint of the heaviest child."""
         between = self._aligned.between.get(k)
         return sub(self._links[k].arm, at) if between is None else between
-
-    def _pivot_row(
-        self, motion: MotionAxis, held: bool, every: _Others
-    ) -> tuple[Row, tuple[Row, ...], _Others, tuple[GivensRotation | Sum, ...]]:
-        """The pivot row of a motion axis, and the rows from which its acceleration is found.
-
-        If the link has inertia along the axis (`held`), the pivot is the triangle's own row; else a
-        row that contains the axis alone, or one gathered from all rows that contain it.
-        """
-        column = column_of(motion)
-        kept, free, rotations = dict(every.kept), list(every.free), Steps()
-        if held:
-            first = kept.pop(column)
-            return first, (first,), _Others(kept, free), ()
-        single = self._rows.empty(column)
-        for n, row in enumerate(free):
-            parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
-            if all(self._scalars.is_zero(a - b) for a, b in parts):
-                return row, (row,), _Others(kept, [*free[:n], *free[n + 1 :]]), ()
-        angular = column[0]
-        sources = tuple(
-            row
-            for row in (*free, *reversed(kept.values()))
-            if not self._scalars.is_zero((row.angular if angular else row.linear)[column[1]])
-        )
-        for n, row in enumerate(free):
-            single, free[n] = self._rows.rotated(single, row, column, rotations)
-        for key in reversed(kept):
-            single, kept[key] = self._rows.rotated(single, kept[key], column, rotations)
-        return single, sources or (single,), _Others(kept, free), tuple(rotations)
-
-    def _eliminate_axis(
-        self,
-        link: Link,
-        axis: tuple[MotionAxis, int],
-        first: Row,
-        others: _Others,
-        term: Wrench,
-        tau: Scalar,
-        *,
-        early: bool = False,
-    ) -> tuple[EliminatedAxis, _Others, Wrench]:
-        """Rotate the pivot row `first` against all others until it alone contains a motion axis.
-
-        It is rotated against the free rows first, or if `early` against the kept ones, which then
-        stay a triangle. A rotor is one more row, with weight `armature`: the joint's acceleration.
-        """
-        s, (motion, i) = self._scalars, axis
-        column = column_of(motion)
-        kept, free, rotations = dict(others.kept), list(others.free), Steps()
-
-        def with_free(pivot: Row) -> Row:
-            for n, row in enumerate(free):
-                pivot, free[n] = self._rows.rotated(pivot, row, column, rotations)
-            return pivot
-
-        pivot = first if early else with_free(first)
-        for key in reversed(kept):
-            pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, rotations)
-        pivot = with_free(pivot) if early else pivot
-        rotor, pushed, back = -1, along(motion, term.moment, term.force), self._rows.zero
-        if s.is_zero(link.armature):
-            pushed, back = pushed + tau, -tau
-        pivot = replace(pivot, force=pivot.force + pushed)
-        moment = sub(term.moment, scale(pushed, pivot.angular))
-        push = sub(term.force, scale(pushed, pivot.linear))
-        if not s.is_zero(link.armature):
-            # The joint's acceleration is the frame's less the parent's.
-            empty = self._rows.empty(column)
-            row = self._rows.make(link.armature, empty.angular, empty.linear, back, tau)
-            rotor = row.index
-            pivot, row = self._rows.rotated(pivot, row, column, rotations)
-            minus = with_component(motion, row.angular, row.linear, -self._rows.one)
-            free.append(replace(row, angular=minus[0], linear=minus[1]))
-        pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
-        share = pivot.force / pivot.weight
-        left = Wrench(*with_component(motion, moment, push, back))
-        one = EliminatedAxis(motion, i, (first,), first.index, share, tuple(rotations), rotor)
-        return one, _Others(kept, free), left

@@ -114,7 +114,7 @@ class Rows:
     """Makes rows, each with its own index, and rotates them."""
 
     def __init__(self, scalars: Scalars) -> None:
-        self._scalars = scalars
+        self.scalars = scalars
         self._indices = count()
         numbers = (0.0, 1.0, TINY, UNKNOWN)
         self.zero, self.one, self.tiny, self.unknown = map(scalars.number, numbers)
@@ -126,7 +126,7 @@ class Rows:
     def empty(self, column: Column) -> Row:
         """A row of negligible weight with 1 in one column and right-hand side 0."""
         angular, axis = column
-        one, zero = unit(axis, self._scalars), zeros(self._scalars)
+        one, zero = unit(axis, self.scalars), zeros(self.scalars)
         units = (one, zero) if angular else (zero, one)
         return replace(self.make(self.tiny, *units, self.zero, self.zero), noise=self.unknown)
 
@@ -139,7 +139,7 @@ class Rows:
 
     def is_empty(self, row: Row) -> bool:
         """Whether all entries of a row are 0."""
-        return all(self._scalars.is_zero(x) for x in (*row.angular, *row.linear))
+        return all(self.scalars.is_zero(x) for x in (*row.angular, *row.linear))
 
     def folded(
         self,
@@ -176,7 +176,7 @@ class Rows:
         self, pivot: Row, rows: Sequence[Row], j: int, rotations: Steps
     ) -> tuple[Row, list[Row]]:
         """Add the rows with angular acceleration j to its pivot row; return the others too."""
-        is_zero = self._scalars.is_zero
+        is_zero = self.scalars.is_zero
         weight, right, force = pivot.weight, pivot.weight * pivot.right, pivot.force
         found, others = [], []
         for row in rows:
@@ -208,7 +208,7 @@ class Rows:
         """
         angular, j = column
         x = (row.angular if angular else row.linear)[j]
-        if self._scalars.is_zero(x):
+        if self.scalars.is_zero(x):
             return pivot, row
         q = row.weight * x
         d = pivot.weight + q * x
@@ -219,7 +219,7 @@ class Rows:
             # c a + s b = a + s (b - x a). The second form is shorter, but less accurate for a
             # large a. In a link's own rows a is not large. If a or b is 0 it saves nothing.
             rest = b - x * a
-            short = own and not self._scalars.is_zero(a) and not self._scalars.is_zero(b)
+            short = own and not self.scalars.is_zero(a) and not self.scalars.is_zero(b)
             return (a + s * rest if short else c * a + s * b), rest
 
         def both(a: Vec, b: Vec, clear: bool) -> tuple[Vec, Vec]:
