@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from eomgen.dynamics.start.diagnostics import initial_overlaps
-from eomgen.model.model import Model, dofs_of
+from eomgen.model.bodies import dofs_of
+from eomgen.model.model import Model
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.joint_loads import mechanism_over
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
-from eomgen.model.model import Point
+from eomgen.model.bodies import Point
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check

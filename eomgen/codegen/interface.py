@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from eomgen.codegen.system import ContactLabel, System
 from eomgen.language.conditions import Condition, is_of_size
 from eomgen.language.formula import written
-from eomgen.model.model import Model, Prescribed
+from eomgen.model.bodies import Prescribed
+from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.tables.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 

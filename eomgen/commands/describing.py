@@ -17,7 +17,8 @@ from eomgen.commands.shared import (
     shortened,
 )
 from eomgen.language.formula import written
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scene.joints.base import WORLD, Geared
 
 

@@ -20,7 +20,8 @@ from eomgen.derivation.linkage import (
 from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr, real
-from eomgen.model.model import JointIndex, Model
+from eomgen.model.bodies import JointIndex
+from eomgen.model.model import Model
 from eomgen.scene.joints.base import WithRotor
 
 ORIGIN = sp.zeros(3, 1)

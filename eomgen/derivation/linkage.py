@@ -11,7 +11,7 @@ import sympy as sp
 
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula
-from eomgen.model.model import Body
+from eomgen.model.bodies import Body
 from eomgen.model.orientation import rows_of, turns_of
 from eomgen.scalars.exact import Real, direction, orientation, quarters, radians
 from eomgen.scene.joints import Joint

@@ -9,9 +9,9 @@ from eomgen.language.base import Table
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO, names_in
 from eomgen.language.quantity import about_slides, of_joint, with_components
+from eomgen.model.bodies import Body, dofs_of
 from eomgen.model.frames import effect_from_centres
 from eomgen.model.inputs import own_inputs
-from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
 from eomgen.scene.constraints import ConstraintTable

@@ -8,6 +8,7 @@ from eomgen.base.errors import SceneError, check_known
 from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia, require
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
+from eomgen.model.bodies import Body, Point, Prescribed, prescribed_of, velocities_of
 from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import (
     check_contacts,
@@ -20,7 +21,7 @@ from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
 from eomgen.model.inputs import own_inputs
-from eomgen.model.model import Body, Model, Point, Prescribed, prescribed_of, velocities_of
+from eomgen.model.model import Model
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values

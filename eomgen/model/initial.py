@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from eomgen.base.errors import SceneError, listed
 from eomgen.language.conditions import ROUNDING
-from eomgen.model.model import Body, Prescribed, positions_of, velocities_of
+from eomgen.model.bodies import Body, Prescribed, positions_of, velocities_of
 from eomgen.model.prescribed import values_by_name
 from eomgen.scene.joints.base import Coordinate
 from eomgen.scene.schema import Initial

@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.model import JointIndex, Model, dofs_of
+from eomgen.model.bodies import JointIndex, dofs_of
+from eomgen.model.model import Model
 from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars

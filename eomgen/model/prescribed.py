@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from eomgen.base.errors import SceneError, listed, nearest
 from eomgen.language.formula import Formula, names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.model import Body
+from eomgen.model.bodies import Body
 from eomgen.model.names import Scope
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Effect

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from statistics import median
 
 from eomgen.language.formula import Formula
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.effects.elements import Link, Touching
 from eomgen.scene.joints.base import WORLD

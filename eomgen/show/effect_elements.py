@@ -7,7 +7,8 @@ import numpy as np
 
 from eomgen.language.formula import Constant, Formula
 from eomgen.language.rewriting import constant
-from eomgen.model.model import Model, dofs_of
+from eomgen.model.bodies import dofs_of
+from eomgen.model.model import Model
 from eomgen.scene.constraints.base import ConstraintTable
 from eomgen.scene.effects.elements import WORLD_INDEX, Element, Vector, Wind
 from eomgen.scene.joints.base import WORLD, kinds_of, spatial

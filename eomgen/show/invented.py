@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant
 from eomgen.language.rewriting import constant, scaled, sum_of, times, total
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scene.effects.elements import Touching
 from eomgen.scene.joints.base import kinds_of, spatial
 from eomgen.scene.look import Box, Cylinder, Disc, Ellipsoid, Polygon, Rod, Shape, Sphere

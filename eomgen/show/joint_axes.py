@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from eomgen.language.formula import Formula
 from eomgen.language.rewriting import constant
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scalars.exact import orientation
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import kinds_of, spatial

@@ -7,8 +7,9 @@ import numpy as np
 
 from eomgen.language.formula import ZERO, Constant
 from eomgen.language.rewriting import constant, valued
+from eomgen.model.bodies import Body
 from eomgen.model.frames import from_centre
-from eomgen.model.model import Body, Model
+from eomgen.model.model import Model
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.effects.elements import (
     WORLD_INDEX,

@@ -15,7 +15,8 @@ from eomgen.derivation.own_names import names_within
 from eomgen.derivation.reading import read
 from eomgen.derivation.symbols import of_scene
 from eomgen.dynamics.tree.mechanism_state import MechanismState
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.model.named import Values
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load

@@ -15,7 +15,8 @@ from eomgen.dynamics.start.diagnostics import (
     values_at,
 )
 from eomgen.dynamics.start.singularity import relative_pivots, why_unresisted
-from eomgen.model.model import Model, dofs_of
+from eomgen.model.bodies import dofs_of
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
 from eomgen.run.problem import Explain, Explanation, FloatArray, Problem, unexplained

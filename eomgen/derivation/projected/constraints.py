@@ -25,7 +25,8 @@ from eomgen.derivation.linkage import (
 )
 from eomgen.derivation.projected.symbols import Ledger, Symbols, triple
 from eomgen.derivation.symbols import Expr, real
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scalars.exact import direction
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Primitive

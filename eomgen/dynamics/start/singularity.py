@@ -23,7 +23,8 @@ from eomgen.dynamics.tree.kinematics import Axes, tree_kinematics
 from eomgen.dynamics.tree.linkage import make_linkage
 from eomgen.dynamics.tree.vectors import Mat
 from eomgen.language.formula import Constant, Formula
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.scalars.exact import exactly
 from eomgen.scalars.floats import ArrayScalars
 from eomgen.scalars.protocol import Scalars

@@ -34,7 +34,8 @@ from eomgen.dynamics.tree.vectors import (
     zeros,
 )
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.model import Body, Model
+from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of
 from eomgen.scalars import exact
 from eomgen.scalars.exact import EYE, ZERO, Matrix, Real

@@ -11,7 +11,8 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate, names_in
-from eomgen.model.model import JointIndex, Model
+from eomgen.model.bodies import JointIndex
+from eomgen.model.model import Model
 from eomgen.model.named import NamedModel, Values
 from eomgen.model.orientation import rows_of
 from eomgen.scalars.extended import Bits
