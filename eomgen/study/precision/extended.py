@@ -45,6 +45,11 @@ def eye() -> Array:
     return extended(np.eye(3))
 
 
+def roots(values: Iterable[Any]) -> Array:
+    """The square root of each number, (n,)."""
+    return extended([x ** mpfr(0.5) for x in values])
+
+
 def of_unit_length(y: Array, quaternions: Iterable[Iterable[int]]) -> Array:
     """A state (n,) with its quaternions, given by their indices, normalised."""
     found = y.copy()

@@ -29,7 +29,7 @@ from eomgen.study.precision.extended import (
 )
 from eomgen.study.precision.precise import Extended
 from eomgen.study.verification.hard_states import State
-from eomgen.study.verification.judging import rest_of, ulps
+from eomgen.study.verification.losses import rest_of, ulps
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.slopes import SMOOTH, STEP
 from eomgen.study.verification.virtual_work import FreeBodies
