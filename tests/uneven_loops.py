@@ -19,7 +19,7 @@ from eomgen.language.formula import Constant
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.study.precision.extended import extended, extended_digits
-from eomgen.study.verification.virtual_work import FreeBodies
+from eomgen.study.verification.free_bodies import FreeBodies
 
 DECADES = 6.0
 """Masses are 10^-6 to 10^6 times what they were."""

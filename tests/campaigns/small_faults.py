@@ -39,10 +39,10 @@ from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.precision.extended import doubles, extended, extended_digits
 from eomgen.study.verification import judging, laws
 from eomgen.study.verification import verify as verifying
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.hard_states import constrained_states, hard_states
 from eomgen.study.verification.roundings import NOTHING, ULP, Roundings, spread
 from eomgen.study.verification.truth import Truth
-from eomgen.study.verification.virtual_work import FreeBodies
 from eomgen.study.whole import names_of
 
 SCENES = (

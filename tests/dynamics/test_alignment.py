@@ -29,8 +29,8 @@ from eomgen.scalars import exact
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.study.precision.extended import doubles, extended_digits
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.truth import Truth
-from eomgen.study.verification.virtual_work import FreeBodies
 
 BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place

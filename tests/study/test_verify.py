@@ -31,6 +31,7 @@ from eomgen.study.precision.extended import doubles, extended, extended_digits
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import sampled as sampling
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.hard_states import KINDS, hard_states
 from eomgen.study.verification.horizon import horizon as horizon_of
 from eomgen.study.verification.judging import judged
@@ -38,7 +39,6 @@ from eomgen.study.verification.laws import kept
 from eomgen.study.verification.roundings import Roundings
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.verify import OUTPUTS, Verified, verify
-from eomgen.study.verification.virtual_work import FreeBodies
 
 SCREW = """
 name = "screw"

@@ -8,10 +8,10 @@ from gmpy2 import mpfr
 
 from eomgen.run.problem import FloatArray
 from eomgen.study.precision.extended import Array, doubles, extended, roots
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.losses import Loss, loss_of, rest_of
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
-from eomgen.study.verification.virtual_work import FreeBodies
 from eomgen.study.whole import Viewed, names_of
 
 

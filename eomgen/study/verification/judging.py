@@ -26,13 +26,13 @@ from eomgen.study.precision.extended import (
     roots,
     solved,
 )
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.judged_outputs import Spreads, judged_outputs, on_tree
 from eomgen.study.verification.losses import Loss, loss_of
 from eomgen.study.verification.roundings import ULP, Roundings
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.ulps import LEAST_SCALE
-from eomgen.study.verification.virtual_work import FreeBodies
 
 NEAR = 4
 """Number of random changes of the data."""

@@ -28,11 +28,11 @@ from eomgen.study.precision.extended import (
     zeros,
 )
 from eomgen.study.precision.precise import Extended
+from eomgen.study.verification.free_bodies import FreeBodies
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.losses import rest_of, ulps
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.slopes import SMOOTH, STEP
-from eomgen.study.verification.virtual_work import FreeBodies
 from eomgen.study.whole import Viewed, names_of, own_of
 
 _LONG_STEP = mpfr(2) ** -40

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD, Geared, WithRotor
-from eomgen.study.precision.extended import NOTHING, Array, along, extended, solved, zeros
+from eomgen.study.precision.extended import NOTHING, Array, extended, solved, zeros
 from eomgen.study.precision.precise import Extended
 from eomgen.study.verification.evaluated import EvaluatedModel
 from eomgen.study.verification.poses import composed
@@ -42,8 +42,8 @@ _MOMENT = mpfr(2) ** -50
 """Step of the differences of constraints, s, for rates of order 1."""
 
 
-class FreeBodies(EvaluatedModel):
-    """M v̇ + V + G = F of a model at a time and a state, its energy, momentum and powers."""
+class VirtualWork(EvaluatedModel):
+    """M v̇ + V + G = F of a model at a time and a state."""
 
     # Equations of motion.
 
@@ -74,12 +74,12 @@ class FreeBodies(EvaluatedModel):
             )
             at = np.ix_(moving, moving)
             matrix[at] = matrix[at] + part
-        for i, armature in self._rotors.items():
+        for i, armature in self.rotors.items():
             matrix[i, i] = matrix[i, i] + armature
         return matrix
 
     @cached_property
-    def _rotors(self) -> dict[int, Extended]:
+    def rotors(self) -> dict[int, Extended]:
         """Reflected inertia of rotors, by velocity, kg m² or kg."""
         found = {}
         for index in self.model.joint_indices:
@@ -203,6 +203,20 @@ class FreeBodies(EvaluatedModel):
         matrix = np.block([[self.mass_matrix, -J.T], [J, zeros(nc, nc)]])
         return solved(matrix, np.concatenate([right, -self.bend]))
 
+    def driving_forces(self, vd: Array) -> Array:
+        """Force or torque on each driven velocity at the v̇ of the others, N or N m."""
+        whole = np.concatenate([vd, self.driven_rates])
+        needed = self._whole_matrix @ whole + self._resisting[0]
+        loads = self._loads["gravity"][0] + self._loads["applied"][0] + self.constraint_push[0]
+        return (needed - loads)[self.nv :]
+
+    def driving_sizes(self, vd: Array) -> Array:
+        """Sum of the sizes of the terms of these forces."""
+        whole = abs(np.concatenate([vd, self.driven_rates]))
+        sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
+        loads = self._loads["gravity"][1] + self._loads["applied"][1] + self.constraint_push[1]
+        return (sizes + loads)[self.nv :]
+
     # Constraints.
 
     @cached_property
@@ -259,18 +273,18 @@ class FreeBodies(EvaluatedModel):
         return self.constraint_jacobian @ self.rates + extended(drift)
 
     @cached_property
-    def _around(self) -> tuple["FreeBodies", "FreeBodies", Extended]:
+    def _around(self) -> tuple["VirtualWork", "VirtualWork", Extended]:
         """The model a moment later and earlier if its velocities did not change."""
         step = _MOMENT / (1 + max(map(abs, self.rates)))
         return self._later(step), self._later(-step), step
 
-    def _later(self, step: Extended) -> "FreeBodies":
+    def _later(self, step: Extended) -> "VirtualWork":
         nq = len(self.model.coordinates)
         q = extended(self.q[:nq])
         q = q + step * self._position_rates(q) + step**2 / 2 * self._bends(q)
         given = self.values
         y = [*q, *given.v, *given.states.values()]
-        return FreeBodies(self.model, given.time + step, y, given.inputs, given.parameters)
+        return VirtualWork(self.model, given.time + step, y, given.inputs, given.parameters)
 
     def _bends(self, q: Array) -> Array:
         """q̈ at constant velocities: of quaternions alone."""
@@ -297,29 +311,6 @@ class FreeBodies(EvaluatedModel):
         extra = [rate for effect in self.model.effects for rate in effect.rates(self)]
         return extended([*self._position_rates(extended(self.q)), *self.vd, *extra])
 
-    # Energy and momentum.
-
-    @cached_property
-    def kinetic_energy(self) -> Extended:
-        """The kinetic energy of all bodies and rotors, J."""
-        energy = mpfr(0)
-        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            u, w = along(self.rates, pose.position_v), self.spin(k)
-            energy += (self.mass(name) * (u @ u) + w @ self.inertias[k] @ w) / 2
-        for i, armature in self._rotors.items():
-            energy += armature * self.rates[i] ** 2 / 2
-        return energy
-
-    @cached_property
-    def potential_energy(self) -> Extended:
-        """The potential energy of all effects, J."""
-        return np.sum(self.potential_energies, initial=mpfr(0))
-
-    @cached_property
-    def potential_energies(self) -> Array:
-        """The potential energy of each effect, J."""
-        return extended([effect.potential_energy(self) for effect in self.model.effects])
-
     @cached_property
     def reach(self) -> Extended:
         """Sum of the distances of all bodies from their parents, m: a bound of any position."""
@@ -328,80 +319,6 @@ class FreeBodies(EvaluatedModel):
             base = self.poses[body.parent].position if body.parent >= 0 else zeros(3)
             total += np.sum(abs(pose.position - base))
         return total
-
-    @cached_property
-    def momentum(self) -> Array:
-        """Linear momentum, then angular momentum about the world's origin, world axes, (6,)."""
-        return self._momentum[0]
-
-    @cached_property
-    def momentum_sizes(self) -> Array:
-        """Sum of the sizes of the terms of momentum, (6,)."""
-        return self._momentum[1]
-
-    @cached_property
-    def _momentum(self) -> tuple[Array, Array]:
-        total, sizes = zeros(6), zeros(6)
-        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            p = self.mass(name) * along(self.rates, pose.position_v)
-            spin = self.inertias[k] @ self.spin(k)
-            total = total + np.concatenate([p, np.cross(pose.position, p) + spin])
-            arm, force = abs(pose.position), abs(p)
-            moment = np.sum(arm) * np.sum(force) + np.sum(abs(spin))
-            sizes = sizes + np.concatenate([zeros(3) + np.sum(force), zeros(3) + moment])
-        return total, sizes
-
-    def inertial_sizes(self, vd: Array) -> Array:
-        """Sum of the sizes of all terms of the rate of momentum at v̇, (6,)."""
-        whole, sizes = np.concatenate([vd, self.driven_rates]), zeros(6)
-        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            w, inertia = self.spin(k), self.inertias[k]
-            force = self.mass(name) * (abs(pose.position_b) + abs(along(whole, pose.position_v)))
-            spin = abs(inertia) @ (abs(pose.spin_b) + abs(along(whole, pose.spin_v)))
-            spin = spin + abs(np.cross(w, inertia @ w))
-            linear, moment = np.sum(force), np.sum(spin)
-            moment = moment + np.sum(abs(pose.position)) * linear
-            sizes = sizes + np.concatenate([zeros(3) + linear, zeros(3) + moment])
-        return sizes
-
-    @cached_property
-    def powers(self) -> tuple[Array, Array]:
-        """The power of each effect's loads, W, and the sizes of its terms; 0 for drives."""
-        pushes = [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
-        speeds = abs(self.rates)
-        return (
-            extended([push @ self.rates for push, _ in pushes]),
-            extended([sizes @ speeds for _, sizes in pushes]),
-        )
-
-    @cached_property
-    def effect_powers(self) -> tuple[Array, Array]:
-        """The same including the power of drives, at the v̇ that the effects cause."""
-        powers, sizes = (x.copy() for x in self.powers)
-        if self.model.driven:
-            taken = dict(zip(self.model.driven, self.driving_forces(self.vd), strict=True))
-            speeds = dict(zip(self.model.driven, self.rates[self.nv :], strict=True))
-            at = {effect.name: k for k, effect in enumerate(self.model.effects)}
-            needed = dict(zip(self.model.driven, self.driving_sizes(self.vd), strict=True))
-            for drive, force in taken.items():
-                k = at[str(drive.by)]
-                powers[k] = force * speeds[drive]
-                sizes[k] = needed[drive] * abs(speeds[drive])
-        return powers, sizes
-
-    def driving_forces(self, vd: Array) -> Array:
-        """Force or torque on each driven velocity at the v̇ of the others, N or N m."""
-        whole = np.concatenate([vd, self.driven_rates])
-        needed = self._whole_matrix @ whole + self._resisting[0]
-        loads = self._loads["gravity"][0] + self._loads["applied"][0] + self.constraint_push[0]
-        return (needed - loads)[self.nv :]
-
-    def driving_sizes(self, vd: Array) -> Array:
-        """Sum of the sizes of the terms of these forces."""
-        whole = abs(np.concatenate([vd, self.driven_rates]))
-        sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
-        loads = self._loads["gravity"][1] + self._loads["applied"][1] + self.constraint_push[1]
-        return (sizes + loads)[self.nv :]
 
 
 def _reach(slopes: Array, force: Array | Extended) -> Array:
