@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
-from eomgen.language.formula import Formula, evaluate
+from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.model.bodies import JointIndex, dofs_of
 from eomgen.model.model import Model
-from eomgen.model.partials import gradient_of, partials_of
+from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Partials
@@ -107,15 +107,39 @@ class NamedModel:
         """A quantity."""
         return evaluate(formula, {**self.names, **names} if names else self.names, self.scalars)
 
+    def slope(self, formula: Formula, names: Mapping[str, Scalar], name: str) -> Scalar:
+        """The derivative of a formula of `names` by one of them, by dual numbers."""
+        duals = Duals(self.scalars)
+        along = {used: duals.still(names[used]) for used in names_in(formula)}
+        along[name] = Dual(names[name], self.scalars.number(1.0))
+        return evaluate(formula, along, duals).rate
+
     def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
-        """A formula with its derivatives, by dual numbers along one coordinate at a time."""
-        return partials_of(formula, by, self.model, self.names, self.scalars)
+        """A formula with its derivatives, along one coordinate at a time."""
+        names, used = self.names, set(names_in(formula))
+        slopes = []
+        for body in self.model.bodies:
+            own = body.positions if by == "positions" else body.velocities
+            along = ((i, c.name) for i, c in enumerate(own) if c.name in used)
+            slopes += [(body.joint.name, i, self.slope(formula, names, x)) for i, x in along]
+        rates = {c.name: self.zero for body in self.model.bodies for c in body.velocities}
+        return Partials(
+            evaluate(formula, names, self.scalars),
+            tuple(slopes),
+            self.slope(formula, names, "t") if "t" in used else self.zero,
+            evaluate(formula, {**names, **rates}, self.scalars),
+        )
 
     def gradient(
         self, formula: Formula, names: Mapping[str, Scalar]
     ) -> tuple[Scalar, Vector, Scalar]:
         """A formula of `names`, t and parameters with its derivatives by the names and by t."""
-        return gradient_of(formula, names, self.names, self.scalars)
+        values, used = {**self.names, **names}, set(names_in(formula))
+        *slopes, by_time = (
+            self.slope(formula, values, name) if name in used else self.zero
+            for name in (*names, "t")
+        )
+        return evaluate(formula, values, self.scalars), tuple(slopes), by_time
 
     def input(self, name: str) -> Scalar:
         """An input."""

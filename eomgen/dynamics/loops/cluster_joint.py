@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from eomgen.dynamics.loops.cluster_motion import Motion
 from eomgen.dynamics.loops.clusters import Cluster
 from eomgen.dynamics.loops.constraints import Symmetric as Factored
 from eomgen.dynamics.loops.constraints import factored, inner
 from eomgen.dynamics.tree.articulated import ArticulatedInertia
 from eomgen.dynamics.tree.forces import Wrench
+from eomgen.dynamics.tree.motion import Motion
 from eomgen.dynamics.tree.vectors import AXES, ENTRIES, symmetric
 from eomgen.scalars.protocol import Scalar, Scalars
 

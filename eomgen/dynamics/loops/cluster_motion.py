@@ -6,11 +6,9 @@ from eomgen.dynamics.loops.clusters import Cluster
 from eomgen.dynamics.tree.articulated import ArticulatedInertia, joined, moved_to_parent
 from eomgen.dynamics.tree.forces import Wrench, at_parent, no_wrench, total
 from eomgen.dynamics.tree.kinematics import Link
-from eomgen.dynamics.tree.vectors import Vec, add, cross, dot, scale, times, transposed, zeros
+from eomgen.dynamics.tree.motion import Motion, outward, with_rate
+from eomgen.dynamics.tree.vectors import add, dot, times, transposed, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
-
-Motion = tuple[Vec, Vec]
-"""An angular and a linear velocity or acceleration of a frame, at its origin."""
 
 
 def motions(
@@ -25,16 +23,9 @@ def motions(
             angular, linear = outward(link, *found[link.parent])
         for axis, i in link.free:
             if not scalars.is_zero(v[i]):
-                more = scale(v[i], axis.direction)
-                angular = add(angular, more) if axis.angular else angular
-                linear = linear if axis.angular else add(linear, more)
+                angular, linear = with_rate(axis, v[i], angular, linear)
         found[k] = angular, linear
     return found
-
-
-def outward(link: Link, angular: Vec, linear: Vec) -> Motion:
-    """The motion of a frame that is fixed to its parent."""
-    return link.rotation.into(angular), link.rotation.into(add(linear, cross(angular, link.arm)))
 
 
 def needed(p: ArticulatedInertia, motion: Motion) -> Wrench:

@@ -87,6 +87,24 @@ def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar
 # Factors.
 
 
+def _reduced(right: Sequence[Scalar], lower: Sequence[dict[int, Scalar]]) -> list[Scalar]:
+    """x with L x = right."""
+    x = list(right)
+    for i, row in enumerate(lower):
+        for j, entry in row.items():
+            x[i] = x[i] - entry * x[j]
+    return x
+
+
+def _back(right: Sequence[Scalar], lower: Sequence[dict[int, Scalar]]) -> list[Scalar]:
+    """x with Lᵀ x = right."""
+    x = list(right)
+    for i in reversed(range(len(x))):
+        for j, entry in lower[i].items():
+            x[j] = x[j] - entry * x[i]
+    return x
+
+
 @dataclass(frozen=True, eq=False)
 class Symmetric:
     """A = L D Lᵀ with unit lower triangular L; entries of L that are 0 are left out."""
@@ -96,15 +114,9 @@ class Symmetric:
 
     def solved(self, right: Sequence[Scalar]) -> list[Scalar]:
         """x with A x = right."""
-        x = list(right)
-        for i, row in enumerate(self.lower):
-            for j, entry in row.items():
-                x[i] = x[i] - entry * x[j]
+        x = _reduced(right, self.lower)
         x = [a / d for a, d in zip(x, self.d, strict=True)]
-        for i in reversed(range(len(x))):
-            for j, entry in self.lower[i].items():
-                x[j] = x[j] - entry * x[i]
-        return x
+        return _back(x, self.lower)
 
 
 def factored(
@@ -168,10 +180,7 @@ class Square:
 
     def solved(self, right: Sequence[Scalar]) -> list[Scalar]:
         """x with A x = right."""
-        x = list(right)
-        for i, row in enumerate(self.lower):
-            for j, entry in row.items():
-                x[i] = x[i] - entry * x[j]
+        x = _reduced(right, self.lower)
         for i in reversed(range(len(x))):
             for j, entry in self.upper[i].items():
                 x[i] = x[i] - entry * x[j]
@@ -193,10 +202,7 @@ class Square:
                 x[i], x[i + 1] = pivot.solved_transposed(x[i], x[i + 1])
             for j, entry in row.items():
                 x[j] = x[j] - entry * x[i]
-        for i in reversed(range(len(x))):
-            for j, entry in self.lower[i].items():
-                x[j] = x[j] - entry * x[i]
-        return x
+        return _back(x, self.lower)
 
     def squares(self, sizes: Sequence[Scalar]) -> list[Scalar]:
         """The square of each pivot, in the unit of its row, for the squares of the rows' lengths.

@@ -17,12 +17,10 @@ from dataclasses import dataclass
 
 from eomgen.dynamics.loops.cluster_joint import Equation, Joint, without
 from eomgen.dynamics.loops.cluster_motion import (
-    Motion,
     carried,
     composite,
     motions,
     needed,
-    outward,
     power,
     rotors,
 )
@@ -32,15 +30,16 @@ from eomgen.dynamics.loops.constraints import factored
 from eomgen.dynamics.tree.articulated import (
     ArticulatedInertia,
     Pivot,
-    eliminated,
     inwards,
     joined,
     moved_to_parent,
     outwards,
+    pivots_of,
     rigid_body_inertia,
 )
 from eomgen.dynamics.tree.forces import Wrench, at_parent, total
 from eomgen.dynamics.tree.kinematics import Link, TreeKinematics
+from eomgen.dynamics.tree.motion import Motion, outward, with_rate
 from eomgen.dynamics.tree.vectors import (
     add,
     dot,
@@ -87,12 +86,8 @@ def articulate(
             joints[k] = _joint(links, first[k], sums, columns, solver, names, scalars)
         if k in inside:
             continue
-        link, p = links[k], sums[k]
-        found = []
-        for axis, _ in link.free:
-            pivot, p = eliminated(p, axis, link, scalars)
-            found.append(pivot)
-        pivots[k] = tuple(found)
+        link = links[k]
+        pivots[k], p = pivots_of(link, sums[k], scalars)
         if link.parent >= 0:
             sums[link.parent] = joined(sums[link.parent], moved_to_parent(link, p, scalars))
     return Articulated(pivots, joints, inside)
@@ -237,9 +232,7 @@ def _outwards(
             angular, linear = outward(link, *reached[link.parent])
         if k in found.inside:
             for axis, i in link.free:
-                more = scale(result[i], axis.direction)
-                angular = add(angular, more) if axis.angular else angular
-                linear = linear if axis.angular else add(linear, more)
+                angular, linear = with_rate(axis, result[i], angular, linear)
             reached.append((angular, linear))
             continue
         reached.append(outwards(link, found.pivots[k], (angular, linear), shares, result))

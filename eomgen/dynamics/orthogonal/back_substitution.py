@@ -9,7 +9,8 @@ from eomgen.dynamics.orthogonal.rows import EliminatedAxis, EliminatedLink, undo
 from eomgen.dynamics.tree import articulated
 from eomgen.dynamics.tree.articulated import Pivot, along, with_component
 from eomgen.dynamics.tree.kinematics import Link
-from eomgen.dynamics.tree.vectors import Vec, add, cross, dot, named, zeros
+from eomgen.dynamics.tree.motion import outward
+from eomgen.dynamics.tree.vectors import Vec, dot, named, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 
@@ -29,9 +30,7 @@ def outwards(
     for link, eliminated in zip(links, found, strict=True):
         angular, linear = zeros(scalars), zeros(scalars)
         if link.parent >= 0:
-            base_angular, base_linear = reached[link.parent]
-            angular = link.rotation.into(base_angular)
-            linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
+            angular, linear = outward(link, *reached[link.parent])
         if not isinstance(eliminated, EliminatedLink):
             motion = articulated.outwards(link, eliminated, (angular, linear), shares, result)
             reached.append(motion)

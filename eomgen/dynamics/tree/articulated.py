@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 from eomgen.dynamics.tree.forces import Wrench, at_parent, total
 from eomgen.dynamics.tree.kinematics import Link, MotionAxis, TreeKinematics
+from eomgen.dynamics.tree.motion import outward, with_rate
 from eomgen.dynamics.tree.vectors import (
     AXES,
     ENTRIES,
@@ -80,15 +81,22 @@ def articulate_links(
     sums = [rigid_body_inertia(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
     for k in sorted(which, reverse=True):
-        link, p = links[k], sums[k]
-        found = []
-        for axis, _ in link.free:
-            pivot, p = eliminated(p, axis, link, scalars)
-            found.append(pivot)
-        pivots[k], sums[k] = tuple(found), p
+        link = links[k]
+        pivots[k], sums[k] = pivots_of(link, sums[k], scalars)
         if link.parent in which:
-            sums[link.parent] = joined(sums[link.parent], moved_to_parent(link, p, scalars))
+            sums[link.parent] = joined(sums[link.parent], moved_to_parent(link, sums[k], scalars))
     return tuple(pivots), sums
+
+
+def pivots_of(
+    link: Link, p: ArticulatedInertia, scalars: Scalars
+) -> tuple[tuple[Pivot, ...], ArticulatedInertia]:
+    """The pivots of a link's free motion axes, and what is left of its inertia without them."""
+    found = []
+    for axis, _ in link.free:
+        pivot, p = eliminated(p, axis, link, scalars)
+        found.append(pivot)
+    return tuple(found), p
 
 
 def respond(
@@ -154,9 +162,7 @@ def outwards(
             angular, linear = with_component(axis, angular, linear, value)
         else:
             result[i] = value
-            more = scale(value, axis.direction)
-            angular = add(angular, more) if axis.angular else angular
-            linear = linear if axis.angular else add(linear, more)
+            angular, linear = with_rate(axis, value, angular, linear)
     return angular, linear
 
 
@@ -171,9 +177,7 @@ def _outwards(
     for k, link in enumerate(kinematics.links):
         angular, linear = nothing, nothing
         if link.parent >= 0:
-            base_angular, base_linear = reached[link.parent]
-            angular = link.rotation.into(base_angular)
-            linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
+            angular, linear = outward(link, *reached[link.parent])
         angular, linear = outwards(link, pivots[k], (angular, linear), shares, result)
         angular = named(angular, f"alpha_{link.name}", scalars)
         reached.append((angular, named(linear, f"delta_{link.name}", scalars)))

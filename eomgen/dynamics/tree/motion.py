@@ -7,7 +7,7 @@ classical accelerations of points, not spatial accelerations.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.tree.kinematics import Link, TreeKinematics
+from eomgen.dynamics.tree.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.tree.solids import Solid
 from eomgen.dynamics.tree.vectors import (
     Mat,
@@ -21,6 +21,9 @@ from eomgen.dynamics.tree.vectors import (
     zeros,
 )
 from eomgen.scalars.protocol import Scalar, Scalars
+
+Motion = tuple[Vec, Vec]
+"""An angular and a linear velocity or acceleration of a frame, at its origin."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +60,7 @@ def velocities(
     for link in kinematics.links:
         angular, linear = zeros(scalars), zeros(scalars)
         if link.parent >= 0:
-            parent = found[link.parent]
-            angular = link.rotation.into(parent.angular)
-            linear = link.rotation.into(add(parent.linear, cross(parent.angular, link.arm)))
+            angular, linear = outward(link, found[link.parent].angular, found[link.parent].linear)
         own_angular, own_linear = own_motion(link, v, scalars)
         angular = named(add(angular, own_angular), f"omega_{link.name}", scalars)
         linear = named(add(linear, own_linear), f"velocity_{link.name}", scalars)
@@ -67,16 +68,23 @@ def velocities(
     return tuple(found)
 
 
-def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[Vec, Vec]:
+def outward(link: Link, angular: Vec, linear: Vec) -> Motion:
+    """The motion of a frame that is fixed to its parent, which moves like this."""
+    return link.rotation.into(angular), link.rotation.into(add(linear, cross(angular, link.arm)))
+
+
+def with_rate(axis: MotionAxis, rate: Scalar, angular: Vec, linear: Vec) -> Motion:
+    """A motion and that along an axis."""
+    more = scale(rate, axis.direction)
+    return (add(angular, more), linear) if axis.angular else (angular, add(linear, more))
+
+
+def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> Motion:
     """S v of the link's own velocities, or S v̇ of its accelerations: angular, linear."""
-    angular, linear = zeros(scalars), zeros(scalars)
+    motion = zeros(scalars), zeros(scalars)
     for axis, i in zip(link.axes, link.v, strict=True):
-        part = scale(rates[i], axis.direction)
-        if axis.angular:
-            angular = add(angular, part)
-        else:
-            linear = add(linear, part)
-    return angular, linear
+        motion = with_rate(axis, rates[i], *motion)
+    return motion
 
 
 def accelerations(

@@ -5,18 +5,17 @@ Joints are composed of their primitives. Driving formulas are differentiated by 
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.formula import Formula, evaluate, names_in
+from eomgen.language.formula import Formula, evaluate
 from eomgen.model.bodies import JointIndex
 from eomgen.model.model import Model
 from eomgen.model.named import NamedModel, Values
 from eomgen.model.orientation import rows_of
 from eomgen.scalars.extended import Bits
-from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.study.precision.extended import Array, along, extended, zeros
@@ -115,41 +114,13 @@ class EvaluatedModel(NamedModel):
             return vector
         return self._cut(self.poses[self.index[body]].rotation @ self.in_space(vector))
 
-    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
-        """A formula with its derivatives, by central differences."""
-        names, used = self.names, set(names_in(formula))
-
-        def slope(name: str) -> Extended:
-            x = names[name]
-            ahead, behind = (
-                evaluate(formula, {**names, name: x + h}, self.scalars) for h in (_BESIDE, -_BESIDE)
-            )
-            return (ahead - behind) / (2 * _BESIDE)
-
-        slopes = [
-            (body.joint.name, i, slope(c.name))
-            for body in self.model.bodies
-            for i, c in enumerate(body.positions if by == "positions" else body.velocities)
-            if c.name in used
-        ]
-        still = {c.name: mpfr(0) for body in self.model.bodies for c in body.velocities}
-        by_time = slope("t") if "t" in used else mpfr(0)
-        return Partials(self.value(formula), tuple(slopes), by_time, self.value(formula, **still))
-
-    def gradient(
-        self, formula: Formula, names: Mapping[str, Extended]
-    ) -> tuple[Extended, tuple[Extended, ...], Extended]:
-        """A formula of `names`, t and parameters with its derivatives, by central differences."""
-        values = {**self.values.parameters, "t": self.values.time, **names}
-
-        def slope(name: str) -> Extended:
-            ahead, behind = (
-                evaluate(formula, {**values, name: values[name] + h}, self.scalars)
-                for h in (_BESIDE, -_BESIDE)
-            )
-            return (ahead - behind) / (2 * _BESIDE)
-
-        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
+    def slope(self, formula: Formula, names: Mapping[str, Extended], name: str) -> Extended:
+        """The derivative of a formula of `names` by one of them, by central differences."""
+        ahead, behind = (
+            evaluate(formula, {**names, name: names[name] + h}, self.scalars)
+            for h in (_BESIDE, -_BESIDE)
+        )
+        return (ahead - behind) / (2 * _BESIDE)
 
     @cached_property
     def names(self) -> dict[str, Extended]:
