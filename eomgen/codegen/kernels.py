@@ -1,6 +1,6 @@
 """Kernels: each output of a program as straight-line source code of a language."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from eomgen.codegen.interface import Function, Interface
@@ -119,6 +119,11 @@ def shares(program: Program, name: str, base: Block) -> bool:
         return False
     twice = _operations(program, name, frozenset(base.nodes)) & derivative
     return len(derivative - own) + len(twice) <= MORE * len(own)
+
+
+def elements(names: Sequence[str], array: str) -> list[tuple[str, str]]:
+    """The variables that are used, each with the array element it reads."""
+    return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
 def _operations(program: Program, name: str, known: frozenset[int] = frozenset()) -> set[int]:

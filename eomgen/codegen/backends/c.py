@@ -10,7 +10,7 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends.conditions import Test, refusals
 from eomgen.codegen.backends.division import Line, Part, divided, in_place, together
 from eomgen.codegen.interface import Interface, Variable
-from eomgen.codegen.kernels import Kernel, kernels_of
+from eomgen.codegen.kernels import Kernel, elements, kernels_of
 from eomgen.language.formula import names_in
 from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
@@ -130,16 +130,23 @@ def library(program: Program, interface: Interface, *, vectors: bool = False) ->
     values = context(program, interface)
     wanted = ("derivative",) if vectors else ()
     checked = {
+        **sizes(values, interface),
+        "kernels": values["kernels"],
+        "vectors": {k["name"]: k for k in in_vectors(program, interface, VECTORS, wanted)},
+    }
+    return {**files_of(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
+
+
+def sizes(values: Mapping[str, Any], interface: Interface) -> dict[str, Any]:
+    """What a file that includes the source knows of it, from the values for the source."""
+    return {
         "prefix": interface.name,
         "states": len(interface.states),
         "inputs": len(interface.inputs),
         "parameters": len(interface.parameters),
         "held": len(values["held"]),
-        "kernels": values["kernels"],
         "each": [(name, C_NAMES.get(name, name)) for name in EACH],
-        "vectors": {k["name"]: k for k in in_vectors(program, interface, VECTORS, wanted)},
     }
-    return {**files_of(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
 
 
 _SHARED = ("scene", "prefix", "kernels")
@@ -195,9 +202,9 @@ def written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
         "beside": len(function.extra),
         "given": [
             *((name, f"k[{place[name]}]") for name in kernel.constants),
-            *_places(kernel.state, "y"),
-            *_places(kernel.inputs, "u"),
-            *_places(kernel.extra, "extra"),
+            *elements(kernel.state, "y"),
+            *elements(kernel.inputs, "u"),
+            *elements(kernel.extra, "extra"),
         ],
         "lines": block.lines,
         "results": block.results,
@@ -262,11 +269,6 @@ def paired(lines: Sequence[Line]) -> list[Line]:
             made.append((name, source))
         first, before = name, match
     return made
-
-
-def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:
-    """The variables that are used, each with the array element it reads."""
-    return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
 def _table(variables: Sequence[Variable]) -> list[tuple[int, str, str, str, str]]:

@@ -68,13 +68,8 @@ def columns(
 ) -> dict[str, Any]:
     """Values for templates with kernels of these outputs for columns; `context` is that of `c`."""
     return {
-        "prefix": interface.name,
-        "states": len(interface.states),
-        "inputs": len(interface.inputs),
-        "parameters": len(interface.parameters),
-        "held": len(context["held"]),
+        **c.sizes(context, interface),
         "vectors": c.in_vectors(program, interface, dialect, wanted),
-        "each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH],
         "quaternions": interface.quaternions,
         "shortest": repr(usual_length[0]),
         "longest": repr(usual_length[1]),

@@ -8,7 +8,7 @@ from typing import Any
 from eomgen.base.templating import render
 from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface, Variable
-from eomgen.codegen.kernels import Kernel, kernels_of
+from eomgen.codegen.kernels import Kernel, elements, kernels_of
 from eomgen.codegen.series import series_functions
 from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
@@ -89,18 +89,13 @@ def _written(kernel: Kernel) -> dict[str, Any]:
         "name": function.name,
         "about": function.about.replace("*/", "* /"),
         "constants": ", ".join(kernel.constants),
-        "state": _given(kernel.state, "y"),
-        "inputs": _given(kernel.inputs, "u"),
-        "extra": _given(kernel.extra, "extra"),
+        "state": elements(kernel.state, "y"),
+        "inputs": elements(kernel.inputs, "u"),
+        "extra": elements(kernel.extra, "extra"),
         "takes_extra": bool(function.extra),
         "lines": kernel.block.lines,
         "results": kernel.block.results,
     }
-
-
-def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
-    """The variables that are used, each with the array element it reads."""
-    return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
 def mechanism(
@@ -199,9 +194,9 @@ def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
     function, block, base = kernel.function, kernel.block, kernel.base
     given = [
         *((name, place[name]) for name in kernel.constants),
-        *_given(kernel.state, "y"),
-        *_given(kernel.inputs, "u"),
-        *_given(kernel.extra, "extra"),
+        *elements(kernel.state, "y"),
+        *elements(kernel.inputs, "u"),
+        *elements(kernel.extra, "extra"),
         *((name, f"passed[{i}]") for i, name in enumerate(kernel.taken) if name != "_"),
     ]
     # What is passed on is stored beside the results.
