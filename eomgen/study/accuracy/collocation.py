@@ -5,9 +5,9 @@ method has order 2s, conserves quadratic invariants, is symmetric and A-stable, 
 motion. Hairer, Nørsett, Wanner, Solving ODEs I, section II.7; Hairer, Wanner, Solving ODEs II,
 sections IV.5 and IV.8.
 
-Only the stages and their residuals are in extended precision. The rest need not be as exact: LSODA
-predicts the stages, and Newton's method corrects them with a matrix that is formed and factored in
-doubles.
+Only the stages and their residuals are in extended precision. The rest need not be as exact:
+`forecast` predicts the stages, and Newton's method corrects them with a matrix that is formed and
+factored in doubles.
 """
 
 import math
@@ -267,7 +267,7 @@ def rows(
     """
     start = np.array(precise.initial, dtype=object)
     current = _Progress(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
-    forecast = Forecast(problem, scale, float(times[-1]), lambda: report(float(current.t)))
+    forecast = Forecast(problem, scale, lambda: report(float(current.t)))
     yield Row(start, 0, current.extent)
     for end in times[1:]:
         target = mpfr(float(end))

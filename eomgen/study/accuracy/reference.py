@@ -39,7 +39,7 @@ ROWS = 201
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Numbers of stages, and the tolerance of a step relative to the scale: of the result that is kept,
 and of the other."""
-FORMAT = "reference 4"
+FORMAT = "reference 5"
 """Must change whenever references would come out differently."""
 _SOON = 1.0
 """Processor time that a run in doubles may always take, s."""
