@@ -102,10 +102,8 @@ class Function(Expressions):
         numbers = dict[str, list[str]]()
         for name, x in self.locals.items():
             if not x.sizes:
-                numbers.setdefault(self.to.whole if x.of == "int" else self.to.number, []).append(
-                    name
-                )
-        yield from (f"    {word} {', '.join(many)};" for word, many in numbers.items())
+                numbers.setdefault(type_of(x, self.to), []).append(name)
+        yield from (f"    {word}{', '.join(many)};" for word, many in numbers.items())
         yield from (
             "    " + self._room(name, own, x)
             for name, x in self.locals.items()

@@ -142,7 +142,8 @@ def both_runs(of: str, method: str, dt: float, seconds: float) -> tuple[Any, Tra
     }
     if method in ADAPTIVE:  # how long steps may be where their branches are not seen
         given["data"] |= {"span": 1.5 * seconds}
-    found = run_in_node(other_functions.in_javascript() + code.source, RUN, given)
+    source = other_functions.in_javascript() + code.source
+    found = run_in_node(source, RUN, given, some(300, 3600))
     try:
         if method in ADAPTIVE:  # the end of a run shortens its last steps
             options = {"rtol": 1e-9, "atol": 1e-12, "samples": round(1.5 * seconds / dt) + 1}
