@@ -491,9 +491,9 @@ class FitOptions(Started, Constants):
     rtol: float = option(1e-8, "relative tolerance of the motion and its sensitivities")
     backend: Backend = option(
         "auto",
-        '"c": compute motions in compiled code; "numpy": in Python, with the same bits; "auto": '
-        '"c" if there is a compiler',
-        help="c: compute in compiled C code; numpy: in Python; auto: c if there is a compiler",
+        '"c": compute motions in compiled C code; "numpy": in Python, with the same bits; "auto": '
+        "compile if that pays",
+        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
         value="NAME",
         choices=BACKENDS,
     )

@@ -2,7 +2,9 @@
 
 import ctypes
 import math
+import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +19,8 @@ from eomgen.engine.embedded import DOP853
 from eomgen.engine.sampled import sampled
 from eomgen.fitting.sensitive import MEASURED, Entries, sensitive
 from eomgen.model.model import Model
-from eomgen.native.compiler import find_compiler
-from eomgen.native.library import compiled_library
+from eomgen.native.accelerator import AN_OPERATION, STARTING, pays
+from eomgen.native.library import compiled_library, kept_library
 from eomgen.native.module import Kernels
 from eomgen.run.module import load_module
 from eomgen.run.problem import FloatArray
@@ -69,10 +71,9 @@ class _System(ctypes.Structure):
 class Motion:
     """The motions of a model with their sensitivities to what `names` are; see `sensitive`.
 
-    compiled  whether they are computed in compiled code: if `backend` is "c", or "auto" and there
-              is a compiler
-
-    Raises `RunError` with "c" if there is none.
+    They are computed in Python or in compiled code, with the same bits; with "auto" as runs are:
+    in compiled code if its library is in the store, or once Python has taken as long as compiling
+    will. `compiled` says whether they are. Raises `RunError` with "c" if there is no compiler.
     """
 
     def __init__(
@@ -95,12 +96,33 @@ class Motion:
         self._ny = len(self._module.STATES) // (1 + len(names))
         self._varies = bool(varying)
         self._places = np.array(sum(self._module.QUATERNIONS, ()), np.int64)
-        self._kernels = None
-        if backend == "c" or (backend == "auto" and _has_compiler()):
-            main = f"{about} {package_digest()}"
-            library = compiled_library(main, lambda: _sources(*made()), MAIN)
-            self._kernels = Kernels(self._module, library)
-        self.compiled = self._kernels is not None
+        self._about, self._sources = f"{about} {package_digest()}", lambda: _sources(*made())
+        self._kernels: Kernels | None = None
+        operations = sum(kinds["total"] for kinds in self._module.COST.values())
+        self._price, self._spent = STARTING + AN_OPERATION * operations, 0.0
+        if backend == "c":
+            self._use(compiled_library(self._about, self._sources, MAIN))
+        elif backend == "numpy":
+            self._price = math.inf
+        else:
+            with suppress(RunError):  # no compiler
+                self._use(kept_library(self._about))
+
+    @property
+    def compiled(self) -> bool:
+        """Whether motions are computed in compiled code."""
+        return self._kernels is not None
+
+    def _use(self, library: ctypes.CDLL | None) -> None:
+        self._kernels = Kernels(self._module, library) if library else None
+
+    def _compile_if_it_pays(self, more: float) -> None:
+        """Compile once Python has taken so long, with so much more, s."""
+        self._spent += more
+        if self._kernels is None and pays(self._spent, self._price):
+            self._price = math.inf
+            with suppress(RunError):  # no compiler
+                self._use(compiled_library(self._about, self._sources, MAIN))
 
     def start(self, p: FloatArray, given: Mapping[int, float]) -> FloatArray:
         """The initial state with its sensitivities, (ny (1 + k),); `given` states, by their index,
@@ -119,6 +141,7 @@ class Motion:
         states and sensitivities.
         """
         n, ny, many = len(samples.t), self._ny, self._fitted
+        begun = time.perf_counter()
         found = np.full((n, len(start)), np.nan)
         seen = np.full((n, (1 + many) * self._of), np.nan)
         try:
@@ -126,6 +149,7 @@ class Motion:
             self._fill(p, start, self._rtol * ATOL * sizes, samples.t, inputs, found, seen)
         except (ValueError, ArithmeticError):
             found[:] = np.nan
+        self._compile_if_it_pays(time.perf_counter() - begun)
         whole = found.reshape(n, 1 + many, ny)
         own = seen.reshape(n, 1 + many, self._of)
         return Rows(whole[:, 0], whole[:, 1:], own[:, 0], own[:, 1:])
@@ -274,11 +298,3 @@ def _sources(program: Any, interface: Interface) -> Mapping[str, str]:
     }
     main = render(c.TEMPLATES, "sampled.c.jinja", context)
     return {**c.library(program, interface), MAIN: main}
-
-
-def _has_compiler() -> bool:
-    try:
-        find_compiler()
-    except RunError:
-        return False
-    return True

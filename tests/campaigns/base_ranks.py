@@ -2,10 +2,11 @@
 
     python tests/campaigns/base_ranks.py FILE.urdf… [--allow DIR]…
 
-For each robot on a fixed base: the base parameters, all parameters, whether they are known without
-rounding, the numeric rank of Pinocchio's regressor of joint torques over random states, and the
-gap of its singular values there: the last that counts and the first that does not, relative to the
-first of all. Rotors are left out on both sides.
+For each robot on a fixed base, or one that is free where nothing else moves: the base parameters,
+all parameters, whether they are known without rounding, the numeric rank of Pinocchio's regressor
+of joint torques over random states, and the gap of its singular values there: the last that counts
+and the first that does not, relative to the first of all. Rotors are left out on both sides, and
+joints that mimic others move freely.
 """
 
 import argparse
@@ -23,9 +24,10 @@ from eomgen.dynamics.regressor import ROTOR
 from eomgen.fitting.base_parameters import base_parameters
 
 
-def theirs(path: Path) -> tuple[int, int, float, float]:
+def theirs(path: Path, floating: bool) -> tuple[int, int, float, float]:
     """The rank by the largest gap of singular values below 1e-8, the columns, and its two ends."""
-    model = pin.buildModelFromUrdf(str(path))
+    root = [pin.JointModelFreeFlyer()] if floating else []
+    model = pin.buildModelFromUrdf(str(path), *root)
     data = model.createData()
     rng = np.random.default_rng(1)
     rows: list[Any] = []
@@ -44,9 +46,9 @@ def theirs(path: Path) -> tuple[int, int, float, float]:
     return rank, columns, sizes[rank - 1], sizes[rank] if rank < len(sizes) else 0.0
 
 
-def ours(path: Path, allowed: list[Path]) -> tuple[int, int, bool]:
+def ours(path: Path, allowed: list[Path], floating: bool) -> tuple[int, int, bool]:
     """Base parameters, all, and whether they are exact, without rotors."""
-    tables = dict(eomgen.import_robot(path, allow=allowed).tables)
+    tables = dict(eomgen.import_robot(path, allow=allowed, floating=floating).tables)
     tables.pop("constraints", None)  # of joints that mimic others, which Pinocchio moves freely
     found = base_parameters(eomgen.check(tables))
     own = sum(one.what != ROTOR for one in found.groups)
@@ -61,11 +63,17 @@ def main() -> None:
     given = parser.parse_args()
     same = tried = 0
     for path in given.files:
-        begun = time.process_time()
+        begun, floating = time.process_time(), False
         try:
-            rank, every, exact = ours(path, given.allow)
+            try:
+                rank, every, exact = ours(path, given.allow, floating)
+            except EomgenError as error:
+                if "nothing can move" not in str(error):
+                    raise
+                floating = True
+                rank, every, exact = ours(path, given.allow, floating)
             own = time.process_time() - begun
-            other, _, last, first = theirs(path)
+            other, _, last, first = theirs(path, floating)
         except (EomgenError, ValueError, RuntimeError) as error:
             print(f"{path.name:32} {str(error).splitlines()[0][:100]}", flush=True)
             continue
