@@ -17,10 +17,9 @@ from eomgen.engine.crossings import Watch
 from eomgen.engine.methods import Root
 from eomgen.native import contact_runs
 from eomgen.native.mechanism import Mechanism, made_margins
-from eomgen.native.memory import room
 from eomgen.run import branches
 from eomgen.run.compiled import Array, Stretch, Stride, Watched, WholeRun
-from eomgen.subset.structures import address, filled, take
+from eomgen.subset.structures import address, filled, take, with_room
 
 ROOTS: list[Root] = [
     (name, {}) for name in ("adaptive_steps", "passed_over", "end_at", "normalised")
@@ -178,7 +177,7 @@ def _records(method: Method, stretch: Stretch) -> tuple[Records, ctypes.Structur
     """Room for the records of steps and their rows, and what C is given of it."""
     ny, count, most = len(stretch.solver.y), len(stretch.times), stretch.most
     needed = {*(MEMORY[name] for name in method.memory), *method.counts, *["terms"] * stretch.dense}
-    return room(
+    kept = with_room(
         Records,
         **{name: _NONE for name in SOME if name not in needed},
         most=most,
@@ -188,6 +187,7 @@ def _records(method: Method, stretch: Stretch) -> tuple[Records, ctypes.Structur
         times=stretch.times,
         rows=np.empty((count, ny)),
     )
+    return kept, filled(kept)
 
 
 class _Checked(NamedTuple):
