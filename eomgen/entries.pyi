@@ -113,12 +113,13 @@ def Contact(
     bodies: Literal["all"] | Sequence[str] | None = ...,
     points: Sequence[str] | None = ...,
     at: Sequence[float | str] = ...,
-    against: Literal["plane", "ball", "each_other"] = ...,
+    against: Literal["plane", "heights", "ball", "each_other"] = ...,
     radius: float | str = ...,
     radii: Mapping[str, float | str] = ...,
     corners: Sequence[float | str] | None = ...,
     normal: Sequence[float] = ...,
     offset: float | str = ...,
+    height: float | str = ...,
     other: str = ...,
     other_at: Sequence[float | str] = ...,
     other_radius: float | str = ...,
@@ -142,6 +143,7 @@ def Contact(
     instead, rounded by the radius. These touch
 
     - `against = "plane"`: the half-space n·x <= `offset`, with n along `normal`, by default up;
+    - `against = "heights"`: the ground of the world below `height`, a formula of x, and y in space;
     - `against = "ball"`: the sphere of `other_radius` at `other_at`;
     - `against = "each_other"`: each other, every pair of `bodies`.
 

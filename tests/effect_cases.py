@@ -206,6 +206,9 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
     ("contact", "shapes and shapes",
      f'law = "spring_damper"; against = "each_other"; stiffness = 90.0; shapes = {{ {SHAPES}, '
      'ball = { body = "c", radius = 0.9 } }; except_pairs = [["b", "c"]]', CONSERVES),
+    ("contact", "heights",
+     f'law = "spring_damper"; against = "heights"; height = "0.4 + 0.3*sin(2*x)"; stiffness = 90; '
+     f'{LOSSES}shapes = {{ {SHAPES} }}', damped("friction")),
     ("contact", "impact", 'law = "impact"; bodies = "all"; restitution = 0.5', NO_ENERGY),
     ("external_force", "constant", 'body = "b"; force = <1 2 3>; at = <0.1 0 0.2>', NO_ENERGY),
     ("external_force", "formula", 'body = "b"; axes = "body"; force = <"sin(3*t)" "q_dot*s" 0>',

@@ -139,10 +139,13 @@ SCENES: Mapping[str, str] = {
                        "steering = 1.0\nradius = 0.25\nreach = 0.3"),
     "field": effect(BALL, "field", 'body = "ball"\nforce = ["-y", "x"]'),
     "attraction": effect(BALL, "point_gravity", "mu = 1.0\nat = [1.3, 0.3]"),
+    "heights": effect(
+        BALL, "contact", 'law = "spring_damper"\nstiffness = 1e3\nagainst = "heights"\n'
+        'height = "0.1*sin(5*x)"\nbody = "ball"\nradius = 0.1'),
     "wind": effect(BALL, "drag", 'body = "ball"\nlinear = 0.1\nwind = [3.0, 0.5]'),
     "force": effect(ARM, "external_force", 'body = "arm"\nat = [0.3, 0]\nforce = [0, 1.0]'),
 }  # fmt: skip
-LONGER = {"obstacle": 0.3, "attraction": 0.6, "field": 0.8, "wind": 0.8}
+LONGER = {"heights": 0.4, "obstacle": 0.3, "attraction": 0.6, "field": 0.8, "wind": 0.8}
 """Duration of a scene, s, if its motion is to be seen."""
 CAMERAS = {
     "fit": 'mode = "fit"',

@@ -1,4 +1,6 @@
-"""Arrows that show fields and wind: their formulas at points of the region of a motion."""
+"""What pictures show of formulas at points of the region of a motion: arrows of fields and wind,
+lines of the ground.
+"""
 
 from dataclasses import replace
 from itertools import product
@@ -6,14 +8,16 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.language.formula import ZERO, Formula, names_in
+from eomgen.language.formula import ZERO, Constant, Formula, names_in
 from eomgen.language.rewriting import constant, with_names
 from eomgen.model.model import Model
-from eomgen.scene.effects.elements import Field, Vector, Wind
+from eomgen.scene.effects.elements import Field, GroundLine, Heights, Vector, Wind
 
 Array = NDArray[np.float64]
 ARROWS = {2: (9, 7), 3: (4, 4, 3)}
 """Number of arrows of a field along each axis, in the plane and in space."""
+BROAD, STEPS, LINES = 1.0, 60, 12
+"""Half the width of ground relative to that of the region; parts of a line, and of the width."""
 AROUND = 0.1
 """How much larger than that of the centres of mass the region is on each side."""
 
@@ -54,3 +58,25 @@ def _at(formula: Vector | None, point: Vector, model: Model) -> Vector | None:
     found = tuple(with_names(part, names) for part in formula)
     known = {"t", *model.defaults}
     return found if all(name in known for part in found for name in names_in(part)) else None
+
+
+def ground_lines(ground: Heights, low: Array, high: Array) -> Heights:
+    """The same with lines over the region between two corners, and as far again around it."""
+    if ground.formula is None:
+        return ground
+    middle, half = (low + high)[:-1] / 2, BROAD * (high - low).max()
+    lines = []
+    for axis in range(len(middle)):
+        places = np.linspace(middle[axis] - half, middle[axis] + half, STEPS + 1).tolist()
+        others = [0.0]
+        if len(middle) == 2:
+            other = middle[1 - axis]
+            others = np.linspace(other - half, other + half, LINES + 1).tolist()
+        for across in others:
+            points = []
+            for place in places:
+                own, beside = Constant(place), Constant(across)
+                names = {"xy"[axis]: own, "yx"[axis]: beside}
+                points.append((place, with_names(ground.formula, names)))
+            lines.append(GroundLine(axis, across, tuple(points)))
+    return replace(ground, lines=tuple(lines))

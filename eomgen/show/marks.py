@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from eomgen.language.formula import Apply, Constant, Formula
-from eomgen.language.rewriting import constant, scaled, sum_of
+from eomgen.language.rewriting import constant, scaled, sum_of, times
 from eomgen.scene.effects.elements import (
     WORLD_INDEX,
     AtJoint,
@@ -18,7 +18,10 @@ from eomgen.scene.effects.elements import (
     Attraction,
     Element,
     Field,
+    GroundLine,
+    Heights,
     Link,
+    Plane,
     Pull,
     Round,
     Support,
@@ -130,6 +133,13 @@ def _marks(picture: Picture, element: Element) -> Iterator[Mark]:
             yield Mark(Between(start, end, element.radius), symbols.RAIL, "back")
         case Round():
             yield from _round(element, size)
+        case Heights():
+            yield from (_ground(line, _dimensions(picture)) for line in element.lines)
+        case Plane(body=body) if body != WORLD_INDEX:
+            at = Attachment(body, _times(element.offset, element.normal))
+            x, y = _along(element.normal)
+            symbol = symbols.SQUARE if len(element.normal) == 3 else symbols.EDGE
+            yield Mark(Turned(at, body, x, y, Constant(size)), symbol, "back")
         case Field(center=tuple() as center) | Attraction(center=center):
             at = Attachment(WORLD_INDEX, center)
             yield Mark(Facing(at, Constant(size)), symbols.CENTRE)
@@ -145,6 +155,17 @@ def _marks(picture: Picture, element: Element) -> Iterator[Mark]:
         case Pull():
             at = Attachment(element.body, element.at)
             yield Mark(Facing(at, Constant(0.03 * size)), symbols.ring(1.0))
+
+
+def _ground(line: GroundLine, dimensions: int) -> Mark:
+    """A line of the ground: x along it, y up."""
+    at = [0.0] * dimensions
+    if dimensions == 3:
+        at[1 - line.axis] = line.across
+    along, up = (constant(*np.eye(dimensions)[k]) for k in (line.axis, dimensions - 1))
+    origin = Attachment(WORLD_INDEX, constant(*at))
+    frame = Turned(origin, WORLD_INDEX, along, up, Constant(1.0))
+    return Mark(frame, (symbols.Line(line.points, ink=0.4),), "fixed")
 
 
 def _at_joint(picture: Picture, element: AtJoint, joint: DrawnJoint) -> Iterator[Mark]:
@@ -195,6 +216,14 @@ def _round(ball: Round, size: float) -> Iterator[Mark]:
     if ball.reach is not None:
         reach = Facing(at, sum_of((ball.radius,), (ball.reach,))[0])
         yield Mark(reach, symbols.REACH, "fixed")
+
+
+def _along(normal: Vector) -> tuple[Vector, Vector]:
+    """Unit vectors along a plane; in the plane the second is its normal."""
+    if len(normal) == 2:
+        x, y = normal
+        return (y, times(-1.0, x)), normal
+    return _across(normal)
 
 
 def _across(axis: Vector) -> tuple[Vector, Vector]:

@@ -9,9 +9,18 @@ from eomgen.language.formula import Constant, Formula
 from eomgen.language.rewriting import constant
 from eomgen.model.model import Model
 from eomgen.run.poses import places_of, world_points
-from eomgen.scene.effects.elements import Attraction, Element, Field, Link, Round, Support, Wind
+from eomgen.scene.effects.elements import (
+    Attraction,
+    Element,
+    Field,
+    Heights,
+    Link,
+    Round,
+    Support,
+    Wind,
+)
 from eomgen.scene.look import number, numbers
-from eomgen.show.arrows import field_arrows, region_of, wind_at
+from eomgen.show.arrows import field_arrows, ground_lines, region_of, wind_at
 from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
@@ -34,6 +43,8 @@ def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
     def ranged(element: Element) -> Element:
         if isinstance(element, Field):
             return field_arrows(element, model, *region)
+        if isinstance(element, Heights):
+            return ground_lines(element, *region)
         if isinstance(element, Wind):
             return wind_at(element, model, (region[0] + region[1]) / 2)
         if not isinstance(element, Support):

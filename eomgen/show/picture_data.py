@@ -35,7 +35,8 @@ def picture_data(picture: Picture) -> tuple[dict[str, Any], Geometry]:
     rest = tuple(e for e in picture.elements if not isinstance(e, Wind))
     symbols: dict[Symbol, int] = {}
     marks, ends = [], []
-    for mark in marks_of(replace(picture, elements=rest)):
+    marked = tuple(e for e in rest if not isinstance(e, Plane))  # a page has their faces
+    for mark in marks_of(replace(picture, elements=marked)):
         table = {"kind": mark.frame.kind} | data(mark.frame) | {"layer": mark.layer}
         if mark.symbol is END:
             ends.append(table["at"])

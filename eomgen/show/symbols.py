@@ -61,6 +61,11 @@ def _short(x: float) -> float:
     return round(x, 4) + 0.0
 
 
+EDGE: Symbol = (Line(((-1.0, 0.0), (1.0, 0.0)), 1.4),)
+SQUARE: Symbol = (Line(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))),)
+"""Of a plane that moves, seen in the plane and in space."""
+
+
 def ring(radius: float, weight: float = 1.0) -> Symbol:
     """A circle that is filled with paper."""
     return (Line(arc(radius, count=24), weight, fill=0.0),)

@@ -341,6 +341,9 @@ GEOMETRY = {
     "shapes on a slope": (f"shapes = {{ {ROD}, {EGG}, {ROCK} }}", "NORMAL"),
     "shapes on each other": (f"shapes = {{ {ROD}, {BAR}, {CHEST}, {BRICK} }}", EACH),
     "shapes on a ball": (f"shapes = {{ {ROD}, {CHEST} }}", *BALL),
+    "shapes on hills": (
+        f"shapes = {{ {ROD}, {ROCK}, {CHEST} }}", 'against = "heights"',
+        'height = "0.4*sin(2*x) + 0.3*x*x"'),
     "a box on a body": (f"shapes = {{ {CRATE} }}", "NORMAL", 'other = "b"'),
 }  # fmt: skip
 VECTORS = {"AT": "at = [0.3, -0.2", "NORMAL": "normal = [0.5, -1", "CORNERS": "corners = [0.9, 0.6"}
@@ -488,6 +491,8 @@ def test_rigid_contacts_say_how_their_gaps_change(geometry: str, dimensions: int
             assert abs(gap_rate - power(here, c.normal)) < 1e-25
             ways = np.array([c.normal[0].force, *(t[0].force for t in c.tangents)])
             assert len(ways) == dimensions
+            if geometry == "shapes on hills":  # whose gap rises by another speed than along it
+                ways[0] /= MP.sqrt(ways[0] @ ways[0])
             if geometry.startswith("shapes on") and np.abs(ways[0]).max() < 1e-30:
                 continue  # within the core of a box there is no normal
             assert np.abs(ways @ ways.T - np.eye(dimensions)).max() < 1e-15  # of a double's normal
@@ -497,7 +502,12 @@ def test_rigid_contacts_say_how_their_gaps_change(geometry: str, dimensions: int
                     assert np.abs(wrench(here, loads)).max() < 1e-25
         assert [c.effect for c in contacts] == ["e"] * len(contacts)
         assert float(contacts[0].restitution) == 0.6
-        assert float(contacts[0].friction) == 0.3
+        pressed = (
+            1.0
+            if "hills" not in geometry
+            else np.linalg.norm(np.array(contacts[0].normal[0].force, dtype=float))
+        )
+        assert float(contacts[0].friction) == pytest.approx(0.3 * pressed, rel=1e-15)
         assert float(contacts[0].slip_speed) == 0.01
 
 
@@ -525,6 +535,10 @@ NAMED = {
         *(f"e_chest_brick_{k}" for k in range(1, 9)),
     ],
     "shapes on a ball": ["e_rod", "e_chest"],
+    "shapes on hills": [
+        *("e_rod_1", "e_rod_2", "e_rock_1", "e_rock_2", "e_rock_3"),
+        *(f"e_chest_{k}" for k in range(1, 5)),
+    ],
     "spheres": ["e_a_b"],
     "spheres off-centre": ["e_a"],
 }

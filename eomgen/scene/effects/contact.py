@@ -18,6 +18,7 @@ from eomgen.scene.effects.touching import (
     merged,
     normal_loads,
     point_loads,
+    pressed,
     tangents,
 )
 from eomgen.scene.effects.vectors import LEAST_SQUARE, dot
@@ -39,6 +40,7 @@ class BodyContact(ContactGeometry):
     instead, rounded by the radius. These touch
 
     - `against = "plane"`: the half-space n·x <= `offset`, with n along `normal`, by default up;
+    - `against = "heights"`: the ground of the world below `height`, a formula of x, and y in space;
     - `against = "ball"`: the sphere of `other_radius` at `other_at`;
     - `against = "each_other"`: each other, every pair of `bodies`.
 
@@ -137,7 +139,7 @@ dissipation = 0.2
                 found += normal_loads(touch, force)
                 continue
             gap_rate, slip = gap_rate_and_slip(mechanism, touch)
-            force = self._named_force(mechanism, touch, gap_rate)
+            force = pressed(touch, self._named_force(mechanism, touch, gap_rate))
             speed = self._slip_speed(mechanism)
             size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
             drag = mechanism.value(self.friction) * force / size
@@ -195,7 +197,7 @@ dissipation = 0.2
                 normal_loads(touch, mechanism.number(1.0)),
                 tuple(point_loads(touch, tangent) for tangent in tangents(mechanism, touch)),
                 mechanism.value(self.restitution),
-                mechanism.value(self.friction),
+                pressed(touch, mechanism.value(self.friction)),
                 self._slip_speed(mechanism),
             )
             for name, touch in zip(names, self.touches(mechanism), strict=True)

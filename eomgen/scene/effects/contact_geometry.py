@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, can_meet, not_negative
-from eomgen.language.formula import ZERO, Apply, Constant, Formula
+from eomgen.language.formula import ZERO, Apply, Constant, Formula, names_in
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
 from eomgen.language.rewriting import constant, difference, sum_of, times
 from eomgen.scalars.exact import direction
@@ -19,13 +19,15 @@ from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import OnBodies, wrong
 from eomgen.scene.effects.contact_shapes import ContactShape, between_count
 from eomgen.scene.effects.elements import Element, Layout, Round, Touching
+from eomgen.scene.effects.elements import Heights as HeightsElement
 from eomgen.scene.effects.elements import Plane as PlaneElement
 from eomgen.scene.effects.nearest import between
-from eomgen.scene.effects.touching import Plane, Solid, Touch, on_plane
+from eomgen.scene.effects.touching import Heights, Plane, Solid, Touch, on_heights, on_plane
 from eomgen.scene.joints.base import WORLD
 
 AGAINST = {
     "plane": ("normal", "offset", "corners", "other"),
+    "heights": ("height", "corners"),
     "ball": ("other_radius", "other_at", "other"),
     "each_other": ("pairs", "except_pairs"),
 }
@@ -54,7 +56,7 @@ class ContactGeometry(OnBodies):
         "other_at": ("other",),
     }
 
-    against: Literal["plane", "ball", "each_other"] = "plane"
+    against: Literal["plane", "heights", "ball", "each_other"] = "plane"
     radius: Quantity = quantity("m", "radius", "nonnegative", default=ZERO, validate_default=False)
     radii: dict[Identifier, Quantity] = quantity(
         "m", "radius", "nonnegative", default={}, validate_default=False
@@ -67,6 +69,9 @@ class ContactGeometry(OnBodies):
     )
     offset: Quantity = quantity(
         "m", "position of the plane along its normal", default=ZERO, validate_default=False
+    )
+    height: Quantity = quantity(
+        "m", "height of the ground", sees=("x", "y"), default=ZERO, validate_default=False
     )
     other: Identifier = Field(
         default=WORLD, description="body of the plane or the ball, or 'world'"
@@ -107,7 +112,9 @@ class ContactGeometry(OnBodies):
             if shape.body == self.other and self.against != "each_other":
                 what = "does not move on" if self.other == WORLD else "cannot touch"
                 raise wrong(f"shapes.{name}.body", f"'{shape.body}' {what} itself; name another")
-            if self.against != "plane" and (shape.semi_axes or shape.vertices):
+            if self.against == "heights" and shape.semi_axes:
+                raise wrong(f"shapes.{name}", "touches planes only; give another shape")
+            if self.against not in ("plane", "heights") and (shape.semi_axes or shape.vertices):
                 raise wrong(f"shapes.{name}", "touches planes only; give a sphere, capsule or box")
         for i, pair in enumerate(self.pairs):
             for name in pair:
@@ -150,6 +157,8 @@ class ContactGeometry(OnBodies):
         normal = with_components(self.normal or up, 0.0, dimensions, f"{location}.normal")
         if not any(normal):
             raise SceneError(f"{location}.normal: has no direction; give one that is not zero")
+        if dimensions == 2 and "y" in names_in(self.height):
+            raise SceneError(f"{location}.height: depends on y; in the plane it is a formula of x")
         shapes = {
             name: shape.checked(dimensions, f"{location}.shapes.{name}")
             for name, shape in self.shapes.items()
@@ -186,6 +195,8 @@ class ContactGeometry(OnBodies):
         if self.against == "plane":
             normal = constant(*map(float, direction(self.normal)))
             yield PlaneElement(self.name, other, normal, self.offset)
+        if self.against == "heights":
+            yield HeightsElement(self.name, self.height)
         if self.against == "ball":
             yield Round("ball", self.name, other, self.other_at, self.other_radius)
         names = tuple(layout.bodies)[1:]
@@ -316,6 +327,11 @@ class ContactGeometry(OnBodies):
             ball = Solid(self.other, centre, mechanism.value(self.other_radius))
             for solid in solids:
                 yield from between(mechanism, solid, ball)
+            return
+        if self.against == "heights":
+            heights = Heights.of(self.height, mechanism.dimensions)
+            for solid in solids:
+                yield from on_heights(mechanism, heights, solid)
             return
         zeros = (mechanism.zero,) * mechanism.dimensions
         normal = tuple(mechanism.number(x) for x in direction(self.normal))

@@ -141,6 +141,29 @@ class Plane:
 
 
 @dataclass(frozen=True)
+class GroundLine:
+    """The ground over a line along x (0) or y (1): places along it and heights there, m; `across`
+    is where the line is on the other axis.
+    """
+
+    axis: int
+    across: float
+    points: tuple[tuple[float, Formula], ...]
+
+
+@dataclass(frozen=True)
+class Heights:
+    """The ground of a contact below a height, a formula of x, and y in space; the lines that
+    pictures show of it.
+    """
+
+    kind: ClassVar[str] = "heights"
+    effect: str
+    formula: Formula | None
+    lines: tuple[GroundLine, ...] = ()
+
+
+@dataclass(frozen=True)
 class Field:
     """A force field about a centre, or the force that a formula gives on a point at rest.
 
@@ -221,9 +244,13 @@ class Support:
     high: Formula | None = None
 
 
-Element = Link | AtJoint | Round | Plane | Field | Wind | Attraction | Pull | Weight | Support
+Element = (
+    Link | AtJoint | Round | Plane | Heights | Field | Wind | Attraction | Pull | Weight | Support
+)
 
 
 def without_formula(element: Element) -> Element:
     """An element without the formula of a scene, which may depend on the motion."""
-    return replace(element, formula=None) if isinstance(element, Field | Wind) else element
+    return (
+        replace(element, formula=None) if isinstance(element, Field | Wind | Heights) else element
+    )

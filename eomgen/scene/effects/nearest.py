@@ -5,7 +5,7 @@ from functools import reduce
 from itertools import product
 
 from eomgen.scene.effects.base import Mechanism, Scalar, Vector
-from eomgen.scene.effects.touching import Solid, Touch, on_ball, signed_sums
+from eomgen.scene.effects.touching import Solid, Touch, on_ball, points_of
 from eomgen.scene.effects.vectors import LEAST_SQUARE, add, cross, dot, negative, scale, sub
 
 Arms = tuple[Vector, Vector]
@@ -34,9 +34,9 @@ def _nearest(mechanism: Mechanism, first: Solid, second: Solid) -> Iterator[Poin
         yield *_on_lines(mechanism, first, second), ()
         return
     corners = list[Points]()
-    for arm in _corners(mechanism, first):
+    for arm in points_of(mechanism, first):
         corners.append((arm, *_in_box(mechanism, first, arm, second)))
-    for arm in _corners(mechanism, second) if first.edges else ():
+    for arm in points_of(mechanism, second) if first.edges else ():
         inside, d = _in_box(mechanism, second, arm, first)
         corners.append((inside, arm, negative(d)))
     yield from corners
@@ -59,7 +59,7 @@ def _on_lines(mechanism: Mechanism, first: Solid, second: Solid) -> Arms:
     if len(first.arms) == len(second.arms) == 1:
         return (), ()
     r = _apart(mechanism, first, second)
-    d1, d2 = _corners(mechanism, first)[-1], _corners(mechanism, second)[-1]
+    d1, d2 = points_of(mechanism, first)[-1], points_of(mechanism, second)[-1]
     if not d1:
         return (), _part(mechanism, r, d2)
     if not d2:
@@ -180,13 +180,6 @@ def _share(mechanism: Mechanism, part: Scalar, whole: Scalar, size: Scalar) -> S
     least = mechanism.number(PARALLEL) * size
     share = _within(mechanism, part / mechanism.call("max", whole, least))
     return mechanism.call("select", whole - least, share, mechanism.number(0.5))
-
-
-def _corners(mechanism: Mechanism, solid: Solid) -> list[Vector]:
-    """The corners of a core from `at`, world axes, m."""
-    if solid.edges:
-        return signed_sums(_edges(mechanism, solid)[0])
-    return [mechanism.outward(solid.body, arm) if arm else () for arm in solid.arms]
 
 
 def _edges(mechanism: Mechanism, box: Solid) -> tuple[list[Vector], list[Scalar]]:

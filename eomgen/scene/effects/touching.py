@@ -1,8 +1,11 @@
-"""Contact geometry: points, spheres and corners on a plane, spheres on spheres."""
+"""Contact geometry: points, spheres and corners on a plane or on heights, spheres on spheres."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
+from eomgen.language.derivatives import derivative
+from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
 from eomgen.scene.effects.vectors import add, cross, dot, nearest_square, negative, scale, sub
 from eomgen.scene.joints.base import WORLD
@@ -32,6 +35,7 @@ class Touch:
     energy_term  times the elastic force it is added to the potential energy, m; None for 0. It is
                  not 0 only if centres are within ε = `NEAREST` of each other: (ε² - d²)/(2 ε)
     share        times friction; None for 1. It is not 1 only there: (d/ε)²
+    slope        rate of the gap where the first body's point moves along n with 1 m/s; None for 1
     """
 
     normal: Vector
@@ -39,6 +43,7 @@ class Touch:
     sides: tuple[Side, ...]
     energy_term: Scalar | None = None
     share: Scalar | None = None
+    slope: Scalar | None = None
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,25 @@ class Plane:
     at: Vector
     normal: Vector
     offset: Scalar
+
+
+@dataclass(frozen=True)
+class Heights:
+    """The height of the ground, a formula of x, and y in space, with its first and second
+    derivatives by them.
+    """
+
+    height: Formula
+    slopes: tuple[Formula, ...]
+    bends: tuple[tuple[Formula, ...], ...]
+
+    @classmethod
+    def of(cls, height: Formula, dimensions: int) -> Self:
+        """The height in the plane or in space."""
+        names = "xy"[: dimensions - 1]
+        slopes = tuple(derivative(height, name) for name in names)
+        bends = tuple(tuple(derivative(part, name) for part in slopes) for name in names)
+        return cls(height, slopes, bends)
 
 
 @dataclass(frozen=True)
@@ -115,6 +139,42 @@ def _lowest(mechanism: Mechanism, solid: Solid, normal: Vector) -> Iterator[tupl
         yield arm, dot(normal, arm) if arm else mechanism.zero
 
 
+def points_of(mechanism: Mechanism, solid: Solid) -> list[Vector]:
+    """The points or corners of a core from `at`, world axes, m."""
+    if solid.edges:
+        return signed_sums([mechanism.outward(solid.body, edge) for edge in solid.edges])
+    return [mechanism.outward(solid.body, arm) if arm else () for arm in solid.arms]
+
+
+def on_heights(mechanism: Mechanism, heights: Heights, solid: Solid) -> Iterator[Touch]:
+    """The contacts of the points or corners of a core, rounded, with the ground below a height h.
+
+    The gap of a point, (z - h)/w less the radius with w² = 1 + |∇h|², is its distance to first
+    order, exact for planes and points that touch. The force acts along the gradient of the gap, so
+    it has a potential on any ground.
+    """
+    up = mechanism.dimensions - 1
+    one = mechanism.number(1.0)
+    for arm in points_of(mechanism, solid):
+        place = mechanism.position(solid.body, solid.at)
+        place = add(place, arm) if arm else place
+        names = dict(zip("xyz"[:up], place, strict=False))
+        slopes = [mechanism.value(part, **names) for part in heights.slopes]
+        square = one + dot(tuple(slopes), tuple(slopes))
+        width = mechanism.call("sqrt", square)
+        above = (place[up] - mechanism.value(heights.height, **names)) / width
+        gradient = list[Scalar]()
+        for slope, bends in zip(slopes, heights.bends, strict=True):
+            bent = [mechanism.value(part, **names) for part in bends]
+            gradient.append(-(slope / width) - above * dot(tuple(slopes), tuple(bent)) / square)
+        gradient.append(one / width)
+        slope = mechanism.call("sqrt", dot(tuple(gradient), tuple(gradient)))
+        normal = mechanism.called("n", *(part / slope for part in gradient))
+        (gap,) = mechanism.called("g", above - solid.radius)
+        side = Side(solid.body, solid.at, arm, -solid.radius)
+        yield Touch(normal, gap, (side,), slope=slope)
+
+
 def on_ball(
     mechanism: Mechanism,
     first: Solid,
@@ -157,7 +217,7 @@ def on_ball(
 def gap_rate_of(mechanism: Mechanism, touch: Touch) -> Scalar:
     """The rate of the gap, m/s."""
     u = _relative([_speed(mechanism, side, side.arm) for side in touch.sides])
-    return mechanism.called("gdot", dot(touch.normal, u))[0]
+    return mechanism.called("gdot", _sloped(touch, dot(touch.normal, u)))[0]
 
 
 def gap_rate_and_slip(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
@@ -165,8 +225,19 @@ def gap_rate_and_slip(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vecto
     levers = (_lever(touch, side) for side in touch.sides)
     speeds = [_speed(mechanism, s, lever) for s, lever in zip(touch.sides, levers, strict=True)]
     u = mechanism.called("c", *_relative(speeds))
-    (gap_rate,) = mechanism.called("gdot", dot(touch.normal, u))
-    return gap_rate, mechanism.called("u", *sub(u, scale(gap_rate, touch.normal)))
+    speed = dot(touch.normal, u)
+    (gap_rate,) = mechanism.called("gdot", _sloped(touch, speed))
+    closing = gap_rate if touch.slope is None else speed
+    return gap_rate, mechanism.called("u", *sub(u, scale(closing, touch.normal)))
+
+
+def pressed(touch: Touch, force: Scalar) -> Scalar:
+    """The normal force, N, of a force along the gap."""
+    return _sloped(touch, force)
+
+
+def _sloped(touch: Touch, value: Scalar) -> Scalar:
+    return value if touch.slope is None else touch.slope * value
 
 
 def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:
@@ -175,7 +246,8 @@ def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:
 
 
 def normal_loads(touch: Touch, force: Scalar) -> tuple[Load, ...]:
-    """As `point_loads` for a force along the normal. The lever's part along n has no moment."""
+    """As `point_loads` for a force along the gap. The lever's part along n has no moment."""
+    force = pressed(touch, force)
     return _on_both(touch, scale(force, touch.normal), [side.arm for side in touch.sides])
 
 
