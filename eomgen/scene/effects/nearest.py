@@ -14,6 +14,8 @@ Points = tuple[Vector, Vector, Vector]
 point to the first, world axes, m; () for one that is not computed.
 """
 
+CROSSING = 1e-13
+"""Distance below which lines count as crossing, relative to the magnitude of lengths."""
 PARALLEL = 1e-14
 """Square of the sine of an angle below which lines count as parallel."""
 
@@ -31,7 +33,7 @@ def between(mechanism: Mechanism, first: Solid, second: Solid) -> Iterator[Touch
 def _nearest(mechanism: Mechanism, first: Solid, second: Solid) -> Iterator[Points]:
     """The points at which the two may touch."""
     if not second.edges:
-        yield *_on_lines(mechanism, first, second), ()
+        yield _on_lines(mechanism, first, second)
         return
     corners = list[Points]()
     for arm in points_of(mechanism, first):
@@ -54,11 +56,24 @@ def _apart(mechanism: Mechanism, first: Solid, second: Solid) -> Vector:
     return sub(place(first.body, first.at), place(second.body, second.at))
 
 
-def _on_lines(mechanism: Mechanism, first: Solid, second: Solid) -> Arms:
-    """The nearest points of two points or lines."""
+def _on_lines(mechanism: Mechanism, first: Solid, second: Solid) -> Points:
+    """The nearest points of two points or lines. Lines that cross but for rounding, as all may in
+    a plane, do cross.
+    """
     if len(first.arms) == len(second.arms) == 1:
-        return (), ()
+        return (), (), ()
     r = _apart(mechanism, first, second)
+    one, other = _on_both(mechanism, first, second, r)
+    d = add(r, one) if one else r
+    d = sub(d, other) if other else d
+    beyond = dot(d, d) - mechanism.number((CROSSING * mechanism.magnitude) ** 2)
+    return one, other, tuple(mechanism.call("select", beyond, x, mechanism.zero) for x in d)
+
+
+def _on_both(mechanism: Mechanism, first: Solid, second: Solid, r: Vector) -> Arms:
+    """The nearest points of two lines, one of which may be a point, with r from the second to the
+    first.
+    """
     d1, d2 = points_of(mechanism, first)[-1], points_of(mechanism, second)[-1]
     if not d1:
         return (), _part(mechanism, r, d2)
