@@ -12,6 +12,7 @@ on itself, is elsewhere there.
 """
 
 import argparse
+import re
 import sys
 import time
 from pathlib import Path
@@ -69,7 +70,7 @@ def settled(path: Path, options: argparse.Namespace) -> tuple[str, bool]:
     active = [e["name"] for e in tables["effects"] if e["type"] in ACTIVE]
     tables["effects"] = [e for e in tables["effects"] if e.get("name") not in active]
     defined = tables.pop("definitions", {}).items()
-    if kept := {k: v for k, v in defined if not any(name in v for name in active)}:
+    if kept := {k: v for k, v in defined if not re.search(r"_(activation|force|control)\b", v)}:
         tables["definitions"] = kept
     if not any(e["type"] == "contact" for e in tables["effects"]):
         raise EomgenError("has no contact with the ground")
