@@ -11,9 +11,9 @@ from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.handout.closed import Equations, conditions, written_out_forces
 from eomgen.derivation.handout.forms import StateForm, state_form
+from eomgen.derivation.handout.symbols import Vec, rotate
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.joint_loads import mechanism_over
-from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
 from eomgen.model.bodies import Point
 from eomgen.program.differentiate import jacobian as slopes_of

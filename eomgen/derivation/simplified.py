@@ -10,8 +10,8 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.derivation.projected.simplify import canonical
-from eomgen.derivation.symbols import Expr, tidy
+from eomgen.derivation.rewriting import canonical, tidy
+from eomgen.derivation.symbols import Expr
 
 LONGEST = 90
 """Operations of an expression up to which it is simplified."""

@@ -1,6 +1,6 @@
-"""The symbols of a derivation, and the trigonometry it needs."""
+"""The symbols of a derivation."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,11 +8,13 @@ import sympy as sp
 
 from eomgen.language.formula import Formula, Name, calls_function, evaluate, names_in
 from eomgen.model.model import Model
+from eomgen.model.orientation import rows_of, turns_of
+from eomgen.scalars.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.scalars.protocol import Scalars
+from eomgen.scene.joints.base import WithRotor
 
 Expr = Any
 """A SymPy expression (SymPy carries no types)."""
-Vec = tuple[Expr, Expr]
 
 
 class SympyScalars(Scalars):
@@ -31,51 +33,44 @@ class SympyScalars(Scalars):
         return sp.Function(function, real=True)(*arguments)
 
 
-def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Formula, Expr]) -> Expr:
-    """A quantity over the parameters' symbols.
-
-    A formula with a function in it becomes a separate symbol: the trigonometry here is for sines
-    and cosines of poses only, and the mechanics does not depend on what such a formula is.
-    """
-    if formula in formulas:
-        return formulas[formula]
-    return evaluate(formula, parameters, SympyScalars())
-
-
 @dataclass(frozen=True)
 class Symbols:
-    """Symbols of a model: one list each over coordinates, bodies, or revolute joints.
+    """Symbols of a model.
 
-    `q`, `v`, `a` are coordinates with their first and second derivatives, `tau` generalised forces
-    beside those of the effects. Per body `x`, `y`, `angle` are the pose of the centre of mass in
-    world axes, `xd`, `yd`, `omega` its velocity, `xdd`, `ydd`, `alpha` its acceleration.
-    `formulas` are quantities with functions in them, each one symbol to the derivation.
-    `force` holds the joint force of the body's own joint, acting on its parent (0 if free).
+    `q`, `v`, `a` are coordinates, velocities and their derivatives v̇, `tau` generalised forces
+    beside those of the effects. `formulas` are quantities with functions in them, each one symbol
+    to the derivation; `numbers` are those of fixed rotations, axes and angles, by their sizes.
+    `fixed` holds all symbols that depend on parameters alone.
     """
 
     parameters: dict[str, Expr]
     formulas: dict[Formula, Expr]
+    numbers: dict[Real, Expr]
     inputs: dict[str, Expr]
-    mass: tuple[Expr, ...]
-    inertia: tuple[Expr, ...]
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
     tau: tuple[Expr, ...]
-    x: tuple[Expr, ...]
-    y: tuple[Expr, ...]
-    angle: tuple[Expr, ...]
-    xd: tuple[Expr, ...]
-    yd: tuple[Expr, ...]
-    omega: tuple[Expr, ...]
-    xdd: tuple[Expr, ...]
-    ydd: tuple[Expr, ...]
-    alpha: tuple[Expr, ...]
-    force: tuple[Vec, ...]
+
+    @property
+    def fixed(self) -> frozenset[Expr]:
+        """Symbols that are constant in time."""
+        named = (self.parameters, self.formulas, self.numbers)
+        return frozenset(symbol for symbols in named for symbol in symbols.values())
+
+    def number(self, value: Real) -> Expr:
+        """A number of the scene's geometry: 0, 1 and -1 as integers, which simplify; any other as a
+        symbol, so that SymPy does not round it.
+        """
+        if value in (0, 1, -1):
+            return sp.Integer(int(value))
+        return self.numbers[value] if value > 0 else -self.numbers[opposite(value)]
 
     def value(self, formula: Formula) -> Expr:
-        """A quantity over the parameters' symbols."""
-        return _quantity(formula, self.parameters, self.formulas)
+        """A quantity in the parameters' symbols."""
+        if formula in self.formulas:
+            return self.formulas[formula]
+        return evaluate(formula, self.parameters, SympyScalars())
 
 
 def functions_of_parameters(model: Model) -> Iterator[Formula]:
@@ -86,55 +81,45 @@ def functions_of_parameters(model: Model) -> Iterator[Formula]:
 
 
 def make_symbols(model: Model) -> Symbols:
-    """Symbols for a model; masses and inertias that are one parameter are positive symbols."""
-    positive = {
-        quantity.name
-        for body in model.bodies
-        for quantity in (body.mass, body.moment)
-        if isinstance(quantity, Name)
-    }
-    parameters = {
-        p.name: of_scene(p.name, positive=True) if p.name in positive else of_scene(p.name)
-        for p in model.parameters
-    }
-
+    """Symbols for a model; masses, moments, rotors that are one parameter are positive symbols."""
+    quantities = [q for body in model.bodies for q in (body.mass, *body.inertia_com[:3])]
+    quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, WithRotor)]
+    positive = {quantity.name for quantity in quantities if isinstance(quantity, Name)}
     called = dict.fromkeys(functions_of_parameters(model))
-    formulas = {formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)}
-
-    def quantity(formula: Formula) -> Expr:
-        return _quantity(formula, parameters, formulas)
-
-    coordinates = [c.name for c in model.coordinates]
-    bodies = [body.name for body in model.bodies]
-
-    def each(names: Sequence[str], pattern: str) -> tuple[Expr, ...]:
-        return tuple(real(pattern.format(name)) for name in names)
-
     return Symbols(
-        parameters=parameters,
-        formulas=formulas,
+        parameters={
+            p.name: of_scene(p.name, positive=True) if p.name in positive else of_scene(p.name)
+            for p in model.parameters
+        },
+        formulas={formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)},
+        numbers={
+            x: sp.Symbol(f"number__{i}", positive=True) for i, x in enumerate(_sizes(model), 1)
+        },
         inputs={i.name: of_scene(i.name) for i in model.inputs},
-        mass=tuple(quantity(body.mass) for body in model.bodies),
-        inertia=tuple(quantity(body.moment) for body in model.bodies),
-        q=each(coordinates, "{}"),
-        v=each(coordinates, "{}_dot"),
-        a=each(coordinates, "{}_ddot"),
-        tau=each(coordinates, "tau__{}"),
-        # Names of scenes contain no two underscores, so these are different from all of them.
-        x=each(bodies, "x__{}"),
-        y=each(bodies, "y__{}"),
-        angle=each(bodies, "angle__{}"),
-        xd=each(bodies, "xd__{}"),
-        yd=each(bodies, "yd__{}"),
-        omega=each(bodies, "omega__{}"),
-        xdd=each(bodies, "xdd__{}"),
-        ydd=each(bodies, "ydd__{}"),
-        alpha=each(bodies, "alpha__{}"),
-        force=tuple(
-            (real(f"fx__{body.joint.name}"), real(f"fy__{body.joint.name}"))
-            for body in model.bodies
-        ),
+        q=tuple(real(c.name) for c in model.coordinates),
+        v=tuple(real(c.name) for c in model.velocities),
+        a=tuple(real(c.acceleration) for c in model.velocities),
+        tau=tuple(real(f"tau__{c.name}") for c in model.velocities),
     )
+
+
+def _sizes(model: Model) -> dict[Real, None]:
+    """The sizes of all numbers in fixed rotations, axes and angles that are neither 0 nor 1."""
+    found: dict[Real, None] = {}
+    for body in model.bodies:
+        joint, parts = body.joint, list[Real]()
+        parts += [x for row in orientation(joint.orientation_deg) for x in row]
+        if not isinstance(joint.orientation_deg, tuple):
+            parts.append(quarters(radians(joint.orientation_deg))[1])
+        if joint.orientation is not None and len(rows := rows_of(joint.orientation)) == 1:
+            turns = [turn for _, turn in turns_of(rows[0])] if len(rows[0]) != 4 else []
+            parts += [x for m in turns if isinstance(m, tuple) for row in m for x in row]
+        for primitive in joint.primitives(model.dimensions):
+            if primitive.kind != "spherical":
+                parts += direction(primitive.axis)
+        sizes = (opposite(x) if x < 0 else x for x in parts)
+        found |= dict.fromkeys(x for x in sizes if x not in (0, 1))
+    return found
 
 
 def real(name: str) -> Expr:
@@ -160,106 +145,3 @@ def of_scene(name: str, **assumptions: bool) -> Expr:
 def names_of_scene(model: Model) -> list[str]:
     """The names of parameters and inputs."""
     return [*(p.name for p in model.parameters), *(i.name for i in model.inputs)]
-
-
-def rotate(vector: Vec, angle: Expr) -> Vec:
-    """A vector of body axes in world axes."""
-    c, s = sp.cos(angle), sp.sin(angle)
-    return (vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c)
-
-
-def cross(r: Vec, f: Vec) -> Expr:
-    """z component of r × f."""
-    return r[0] * f[1] - r[1] * f[0]
-
-
-def add(u: Vec, v: Vec) -> Vec:
-    """Sum of two vectors."""
-    return (u[0] + v[0], u[1] + v[1])
-
-
-def scale(k: Expr, v: Vec) -> Vec:
-    """A vector times a scalar."""
-    return (k * v[0], k * v[1])
-
-
-def tidy(expression: Expr) -> Expr:
-    """Expand, and write products of sines and cosines as functions of sums of angles.
-
-    In this normal form terms that are equal by a trigonometric identity are the same term, so that
-    they cancel without a search for simplifications.
-    """
-    expanded = sp.expand(expression)
-    return sp.Add(*(_linear(term) for term in sp.Add.make_args(expanded)))
-
-
-def _linear(term: Expr) -> Expr:
-    """A product with at most one sine or cosine left in each of its terms."""
-    plain, waves = [], []
-    for factor in sp.Mul.make_args(term):
-        base, power = factor.as_base_exp()
-        if isinstance(base, sp.sin | sp.cos) and power.is_Integer and power > 0:
-            waves += [base] * int(power)
-        else:
-            plain.append(factor)
-    if len(waves) < 2:
-        return term
-    sums = waves[0]
-    for wave in waves[1:]:
-        sums = sp.Add(*(_product(part, wave) for part in sp.Add.make_args(sums)))
-    return sp.expand(sp.Mul(*plain) * sums)
-
-
-def _product(part: Expr, wave: Expr) -> Expr:
-    """k · wave₁ · wave₂ by the sum and difference of their angles."""
-    k, first = part.as_coeff_Mul()
-    if not isinstance(first, sp.sin | sp.cos):
-        return part * wave
-    a, b = first.args[0], wave.args[0]
-    match first, wave:
-        case sp.sin(), sp.sin():
-            pair = sp.cos(a - b) - sp.cos(a + b)
-        case sp.cos(), sp.cos():
-            pair = sp.cos(a - b) + sp.cos(a + b)
-        case sp.sin(), sp.cos():
-            pair = sp.sin(a + b) + sp.sin(a - b)
-        case _:
-            pair = sp.sin(a + b) - sp.sin(a - b)
-    return k / 2 * pair
-
-
-def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
-    """Coordinates, velocities and accelerations by those of the bodies: φ = ψ_B - ψ_A.
-
-    Substituted into an expression (`xreplace`), sums along the tree such as θ + φ become one symbol
-    of a body, which keeps expressions short.
-    """
-    result: dict[Expr, Expr] = {}
-    for coordinates, x, y, angle in _orders(symbols):
-        for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
-            base = angle[body.parent] if body.parent >= 0 else sp.Integer(0)
-            result[coordinates[last]] = angle[k] - base
-            if len(body.positions) > 1:
-                result[coordinates[last - 2]], result[coordinates[last - 1]] = x[k], y[k]
-    return result
-
-
-def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
-    """The inverse: the bodies' angles and angular rates as sums of coordinates."""
-    result: dict[Expr, Expr] = {}
-    for coordinates, x, y, angle in _orders(symbols):
-        for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
-            base = result[angle[body.parent]] if body.parent >= 0 else sp.Integer(0)
-            result[angle[k]] = base + coordinates[last]
-            if len(body.positions) > 1:
-                result[x[k]], result[y[k]] = coordinates[last - 2], coordinates[last - 1]
-    return result
-
-
-def _orders(symbols: Symbols) -> tuple[tuple[tuple[Expr, ...], ...], ...]:
-    """Coordinates with the bodies' x, y and angle: pose, first and second derivative."""
-    return (
-        (symbols.q, symbols.x, symbols.y, symbols.angle),
-        (symbols.v, symbols.xd, symbols.yd, symbols.omega),
-        (symbols.a, symbols.xdd, symbols.ydd, symbols.alpha),
-    )

@@ -23,11 +23,11 @@ from eomgen.codegen.system import System
 from eomgen.derivation.linkage import hat, rate
 from eomgen.derivation.projected.constraints import state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
-from eomgen.derivation.projected.simplify import gathered, sum_of_squares
+from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.projected.steps import projected_steps
-from eomgen.derivation.projected.symbols import Ledger, make_symbols
+from eomgen.derivation.rewriting import gathered, sum_of_squares
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
-from eomgen.derivation.symbols import OF_SCENE, of_scene
+from eomgen.derivation.symbols import OF_SCENE, make_symbols, of_scene
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model

@@ -15,9 +15,11 @@ from eomgen.derivation.handout.elimination import (
 )
 from eomgen.derivation.handout.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.handout.kinematics import Kinematics, differentiate_joints
-from eomgen.derivation.handout.solution import Definition, Solution, gathered, solve
+from eomgen.derivation.handout.solution import Definition, Solution, solve
+from eomgen.derivation.handout.symbols import BodySymbols, body_symbols, over_bodies
+from eomgen.derivation.rewriting import by_variables, tidy
 from eomgen.derivation.supported import off_centre, why_not_pins
-from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
+from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import is_zero
 from eomgen.model.model import Model
 
@@ -32,7 +34,7 @@ class Equations:
     """
 
     model: Model
-    symbols: Symbols
+    symbols: BodySymbols
     kinematics: Kinematics
     free_bodies: FreeBodies
     collected: Collected
@@ -64,7 +66,7 @@ def collected_equations(model: Model) -> Equations:
     """
     if why_not := why_not_pins(model):
         raise SceneError(f"route: 'closed' does not derive this scene: {why_not}")
-    symbols = make_symbols(model)
+    symbols = body_symbols(model)
     kinematics = differentiate_joints(model, symbols)
     free_bodies = draw_free_bodies(model, symbols, kinematics)
     collected = collect(model, symbols, kinematics, free_bodies)
@@ -84,7 +86,7 @@ def collected_equations(model: Model) -> Equations:
     )
 
 
-def _generalised_forces(model: Model, symbols: Symbols) -> Expr:
+def _generalised_forces(model: Model, symbols: BodySymbols) -> Expr:
     """Forces τ on the coordinates as rows of the bodies: τ turns the child, -τ the parent."""
     rows = list(symbols.tau)
     for body, last in zip(model.bodies, model.angle_index, strict=True):
@@ -94,7 +96,7 @@ def _generalised_forces(model: Model, symbols: Symbols) -> Expr:
 
 
 def _recovered_forces(
-    model: Model, symbols: Symbols, free_bodies: FreeBodies
+    model: Model, symbols: BodySymbols, free_bodies: FreeBodies
 ) -> tuple[Definition, ...]:
     residuals = []
     for k in range(len(model.bodies)):
@@ -146,5 +148,5 @@ def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
             else:
                 inner = tuple(e.xreplace(inward) for e in kinematics.acceleration[k])
             expression = expression.xreplace({ddx: inner[0], ddy: inner[1]})
-        definitions.append((symbol, gathered(expression, symbols, sums)))
+        definitions.append((symbol, by_variables(tidy(expression), symbols.fixed, sums)))
     return tuple(definitions)

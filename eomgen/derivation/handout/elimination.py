@@ -7,17 +7,17 @@ import sympy as sp
 
 from eomgen.derivation.handout.free_bodies import FreeBodies, Wrench
 from eomgen.derivation.handout.kinematics import Kinematics
-from eomgen.derivation.symbols import (
-    Expr,
-    Symbols,
+from eomgen.derivation.handout.symbols import (
+    BodySymbols,
     Vec,
     add,
     cross,
     over_bodies,
     over_coordinates,
     scale,
-    tidy,
 )
+from eomgen.derivation.rewriting import tidy
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 
@@ -89,7 +89,7 @@ def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
 
 
 def collect(
-    model: Model, symbols: Symbols, kinematics: Kinematics, free_bodies: FreeBodies
+    model: Model, symbols: BodySymbols, kinematics: Kinematics, free_bodies: FreeBodies
 ) -> Collected:
     """Eliminate f_j and the dependent accelerations, and collect (24)."""
     inertial = tuple(
@@ -174,7 +174,7 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
     return result
 
 
-def symmetric(model: Model, symbols: Symbols, kinematics: Kinematics, rows: Expr) -> Expr:
+def symmetric(model: Model, symbols: BodySymbols, kinematics: Kinematics, rows: Expr) -> Expr:
     """The rows of (24) as generalised forces: ½ q̇ᵀ M q̇ is the kinetic energy.
 
     The coordinate of a joint rotates its whole subtree, so its row is the sum of the subtree's.

@@ -11,7 +11,8 @@ import sympy as sp
 
 from eomgen.base.errors import SceneError
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
+from eomgen.derivation.handout.symbols import over_bodies, over_coordinates
+from eomgen.derivation.symbols import Expr
 from eomgen.model.states import State, velocity_states
 from eomgen.scene.joints.base import WORLD
 

@@ -7,8 +7,9 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.handout.kinematics import Kinematics
+from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, cross, rotate, scale
 from eomgen.derivation.joint_loads import joint_loads, mechanism_over
-from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 
@@ -34,7 +35,7 @@ class FreeBodies:
     potential_energy: Expr
 
 
-def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> FreeBodies:
+def draw_free_bodies(model: Model, symbols: BodySymbols, kinematics: Kinematics) -> FreeBodies:
     """Write m ẍ = Σ f and I ψ̈ = Σ r × f for every body.
 
     The joint force f_j acts on the parent at r_parent, and -f_j on the child at r_child.

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, rotate, scale
 from eomgen.derivation.linkage import rate
-from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.joints import Joint
 
@@ -30,7 +31,7 @@ class Kinematics:
     acceleration: tuple[Vec, ...]
 
 
-def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
+def differentiate_joints(model: Model, symbols: BodySymbols) -> Kinematics:
     """State each joint's constraint, and differentiate it twice."""
     rates: dict[Expr, Expr] = {}
     for orders in ((symbols.q, symbols.v, symbols.a), (symbols.x, symbols.xd, symbols.xdd),
@@ -70,6 +71,6 @@ def _rates(vector: Vec, rates: dict[Expr, Expr]) -> Vec:
     return rate(vector[0], rates), rate(vector[1], rates)
 
 
-def _vector(symbols: Symbols, joint: Joint, field: str) -> Vec:
+def _vector(symbols: BodySymbols, joint: Joint, field: str) -> Vec:
     x, y = getattr(joint, field)
     return (symbols.value(x), symbols.value(y))

@@ -19,7 +19,9 @@ import sympy as sp
 
 from eomgen.derivation.handout.elimination import Tree, trees
 from eomgen.derivation.handout.kinematics import Kinematics
-from eomgen.derivation.symbols import Expr, Symbols, Vec, add, over_bodies, scale, tidy
+from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, over_bodies, scale
+from eomgen.derivation.rewriting import by_variables, is_sum_of_positive_terms, tidy
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 Definition = tuple[Expr, Expr]
@@ -54,12 +56,12 @@ class _Pair:
     weight: Expr
     entries: dict[int, Vec]
 
-    def rotated(self, angle: Expr, symbols: Symbols) -> list[_Row]:
+    def rotated(self, angle: Expr, symbols: BodySymbols) -> list[_Row]:
         """The two rows in axes turned by `angle`."""
         c, s = sp.cos(angle), sp.sin(angle)
         pairs = self.entries.items()
-        along = {k: gathered(c * x + s * y, symbols, {}) for k, (x, y) in pairs}
-        across = {k: gathered(c * y - s * x, symbols, {}) for k, (x, y) in pairs}
+        along = {k: by_variables(tidy(c * x + s * y), symbols.fixed) for k, (x, y) in pairs}
+        across = {k: by_variables(tidy(c * y - s * x), symbols.fixed) for k, (x, y) in pairs}
         rows = ({k: e for k, e in row.items() if e != 0} for row in (along, across))
         return [_Row(self.weight, row) for row in rows if row]
 
@@ -83,7 +85,7 @@ class _Notes:
         return self.define(symbol, expression)
 
 
-def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Expr) -> Solution:
+def solve(model: Model, symbols: BodySymbols, kinematics: Kinematics, right_side: Expr) -> Solution:
     """Solve for all accelerations.
 
     `right_side` is F - V - G in the rows of `body_rows`. The definitions end with the accelerations
@@ -109,7 +111,7 @@ def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Ex
 
 def _solve_tree(
     model: Model,
-    symbols: Symbols,
+    symbols: BodySymbols,
     kinematics: Kinematics,
     tree: Tree,
     right_side: Expr,
@@ -141,7 +143,9 @@ def _solve_tree(
         notes.masses.append((tree_mass, total))
         mean = {k: scale(1 / tree_mass, e) for k, e in moment.items()}
         for k, (jx, jy) in mean.items():
-            load[k] = gathered(load[k] - jx * push[0] - jy * push[1], symbols, {tree_mass: total})
+            load[k] = by_variables(
+                tidy(load[k] - jx * push[0] - jy * push[1]), symbols.fixed, {tree_mass: total}
+            )
     pivots, couplings = _eliminate_angles(model, symbols, tree, pairs, load, notes)
     for k in tree.bodies:  # the root was eliminated last and is known first
         known = sum((h * symbols.alpha[i] for i, h in couplings[k].items()), sp.Integer(0))
@@ -150,7 +154,10 @@ def _solve_tree(
         for axis, result in ((0, symbols.xdd[tree.root]), (1, symbols.ydd[tree.root])):
             rotational = sum((j[axis] * symbols.alpha[k] for k, j in mean.items()), sp.Integer(0))
             mean_force = push[axis] / tree_mass
-            notes.define(result, gathered(mean_force - rotational, symbols, {tree_mass: total}))
+            notes.define(
+                result,
+                by_variables(tidy(mean_force - rotational), symbols.fixed, {tree_mass: total}),
+            )
 
 
 def _eliminate_translation(
@@ -179,7 +186,7 @@ def _eliminate_translation(
 
 def _eliminate_angles(
     model: Model,
-    symbols: Symbols,
+    symbols: BodySymbols,
     tree: Tree,
     pairs: list[_Pair],
     load: dict[int, Expr],
@@ -215,7 +222,7 @@ def _eliminate_angles(
             if coupling.get(i, 0) != 0:
                 other = model.bodies[i].name
                 couplings[k][i] = notes.fresh(
-                    f"coupling__{name}__{other}", gathered(coupling[i], symbols, {})
+                    f"coupling__{name}__{other}", by_variables(tidy(coupling[i]), symbols.fixed)
                 )
                 load[i] = load[i] - couplings[k][i] / pivots[k] * load[k]
     return pivots, couplings
@@ -260,38 +267,6 @@ def _named_rows(rows: Sequence[_Row], name: str, notes: _Notes) -> list[_Row]:
     return named
 
 
-def gathered(expression: Expr, symbols: Symbols, sums: dict[Expr, Expr]) -> Expr:
-    """One term for each product of moving quantities, its coefficient in parameters factored.
-
-    `sums` are symbols that stand for sums of parameters: coefficients are factored with the sums
-    written out, and then written with the symbols again.
-
-    Common terms of gravity and inertia cancel here, as on paper: in a floating tree the weight
-    drops out of every angular acceleration.
-    """
-    fixed = {*symbols.parameters.values(), *symbols.formulas.values(), *sums}
-    coefficients: dict[Expr, Expr] = {}
-    for term in sp.Add.make_args(tidy(expression)):
-        moving = [f for f in sp.Mul.make_args(term) if not f.free_symbols <= fixed]
-        key = sp.Mul(*moving)
-        coefficients[key] = coefficients.get(key, sp.Integer(0)) + term / key
-    names = {total: symbol for symbol, total in sums.items()}
-    return sp.Add(
-        *(_factored(c.xreplace(sums)).xreplace(names) * key for key, c in coefficients.items())
-    )
-
-
-def _factored(coefficient: Expr) -> Expr:
-    """A coefficient over one denominator, its numerator factored where that is quick."""
-    top, bottom = sp.fraction(sp.together(coefficient))
-    top = sp.expand(top)
-    if len(sp.Add.make_args(top)) > MOST_FACTORED:
-        return top / bottom
-    return sp.factor(top / bottom)
-
-
-MOST_FACTORED = 24
-"""The most terms of a numerator that is factored; beyond, factoring costs more than it saves."""
 LONGEST_REWRITTEN = 80
 """Operations of a pivot beyond which rewriting it would cost more than it saves."""
 
@@ -322,15 +297,3 @@ def positive_form(pivot: Expr, notes: _Notes) -> Expr:
     if not (is_sum_of_positive_terms(fixed) and is_sum_of_positive_terms(varying)):
         return pivot
     return fixed + varying * sp.sin(angle) ** 2
-
-
-def is_sum_of_positive_terms(expression: Expr) -> bool:
-    """Whether an expression is built of positive symbols and even powers by +, *, / alone."""
-    if expression.is_Add or expression.is_Mul:
-        return all(is_sum_of_positive_terms(part) for part in expression.args)
-    if expression.is_Pow:
-        base, power = expression.args
-        if not power.is_Integer:
-            return False
-        return bool(power % 2 == 0 and base.is_real) or is_sum_of_positive_terms(base)
-    return bool(expression.is_positive)

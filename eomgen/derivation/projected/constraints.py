@@ -23,10 +23,9 @@ from eomgen.derivation.linkage import (
     rate,
     vector,
 )
-from eomgen.derivation.projected.symbols import Ledger, Symbols, triple
-from eomgen.derivation.symbols import Expr, real
-from eomgen.model.bodies import Body
-from eomgen.model.model import Model
+from eomgen.derivation.projected.ledger import Ledger, triple
+from eomgen.derivation.symbols import Expr, Symbols, real
+from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import direction
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Primitive

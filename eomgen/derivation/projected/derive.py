@@ -17,9 +17,10 @@ from eomgen.derivation.projected.equations import (
     inertias,
     loads,
 )
+from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.projected.solution import Solution, solve
-from eomgen.derivation.projected.symbols import Ledger, Symbols, make_symbols
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
+from eomgen.derivation.symbols import Symbols, make_symbols
 from eomgen.model.model import Model
 
 WRITTEN, NAMED = (20, 160), (6, 40)

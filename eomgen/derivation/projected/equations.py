@@ -14,9 +14,9 @@ import sympy as sp
 from eomgen.derivation.joint_loads import joint_loads, mechanism_over
 from eomgen.derivation.linkage import about, inertia_of
 from eomgen.derivation.projected.constraints import Constraint, MotionSymbols
-from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.projected.symbols import Ledger, Symbols
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.projected.ledger import Ledger
+from eomgen.derivation.rewriting import gathered
+from eomgen.derivation.symbols import Expr, Symbols
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WithRotor

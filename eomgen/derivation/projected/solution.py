@@ -20,7 +20,6 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.handout.solution import is_sum_of_positive_terms
 from eomgen.derivation.projected.equations import (
     Inertia,
     Loads,
@@ -29,9 +28,9 @@ from eomgen.derivation.projected.equations import (
     armatures,
     generalised,
 )
-from eomgen.derivation.projected.simplify import nested, sum_of_squares
-from eomgen.derivation.projected.symbols import Ledger, Symbols
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.projected.ledger import Ledger
+from eomgen.derivation.rewriting import is_sum_of_positive_terms, nested, sum_of_squares
+from eomgen.derivation.symbols import Expr, Symbols
 from eomgen.model.model import Model
 
 

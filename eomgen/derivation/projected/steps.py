@@ -7,8 +7,8 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.reading import brief_coordinates, words_on_names
+from eomgen.derivation.rewriting import gathered
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written

@@ -1,16 +1,60 @@
-"""Simplification of expressions by inexpensive rewriting."""
+"""Expressions simplified by inexpensive rewriting, in normal forms in which equal terms cancel."""
 
 from collections.abc import Collection, Mapping
 
 import sympy as sp
 
-from eomgen.derivation.handout.solution import is_sum_of_positive_terms
-from eomgen.derivation.symbols import Expr, tidy
+from eomgen.derivation.symbols import Expr
 
 MOST_TERMS = 400
 """Largest number of terms of an expanded expression that is rewritten."""
 MOST_FACTORED = 24
 """Largest number of terms of a numerator that is factored."""
+
+
+def tidy(expression: Expr) -> Expr:
+    """Expand, and write products of sines and cosines as functions of sums of angles.
+
+    In this normal form terms that are equal by a trigonometric identity are the same term, so that
+    they cancel without a search for simplifications.
+    """
+    expanded = sp.expand(expression)
+    return sp.Add(*(_linear(term) for term in sp.Add.make_args(expanded)))
+
+
+def _linear(term: Expr) -> Expr:
+    """A product with at most one sine or cosine left in each of its terms."""
+    plain, waves = [], []
+    for factor in sp.Mul.make_args(term):
+        base, power = factor.as_base_exp()
+        if isinstance(base, sp.sin | sp.cos) and power.is_Integer and power > 0:
+            waves += [base] * int(power)
+        else:
+            plain.append(factor)
+    if len(waves) < 2:
+        return term
+    sums = waves[0]
+    for wave in waves[1:]:
+        sums = sp.Add(*(_product(part, wave) for part in sp.Add.make_args(sums)))
+    return sp.expand(sp.Mul(*plain) * sums)
+
+
+def _product(part: Expr, wave: Expr) -> Expr:
+    """k · wave₁ · wave₂ by the sum and difference of their angles."""
+    k, first = part.as_coeff_Mul()
+    if not isinstance(first, sp.sin | sp.cos):
+        return part * wave
+    a, b = first.args[0], wave.args[0]
+    match first, wave:
+        case sp.sin(), sp.sin():
+            pair = sp.cos(a - b) - sp.cos(a + b)
+        case sp.cos(), sp.cos():
+            pair = sp.cos(a - b) + sp.cos(a + b)
+        case sp.sin(), sp.cos():
+            pair = sp.sin(a + b) + sp.sin(a - b)
+        case _:
+            pair = sp.sin(a + b) - sp.sin(a - b)
+    return k / 2 * pair
 
 
 def canonical(expression: Expr) -> Expr:
@@ -52,24 +96,32 @@ def gathered(
     if any(wave.args[0].is_Add for wave in expression.atoms(sp.sin, sp.cos)):
         flats.append(tidy(expression))  # products of sines and cosines of sums such as θ + φ
     flat = min(flats, key=sp.count_ops)
-    terms = sp.Add.make_args(flat)
-    if flat == 0 or len(terms) > MOST_TERMS:
+    if flat == 0 or len(sp.Add.make_args(flat)) > MOST_TERMS:
         return flat if flat == 0 else expression
+    whole = by_variables(flat, fixed, sums)
+    least = min((whole, flat, expression), key=sp.count_ops)
+    return whole if sp.count_ops(whole) <= slack * sp.count_ops(least) else least
+
+
+def by_variables(
+    flat: Expr, fixed: Collection[Expr], sums: Mapping[Expr, Expr] | None = None
+) -> Expr:
+    """An expanded sum with one term for each product of variables, as in `gathered`. Terms that
+    are equal cancel, such as those of the weight of a tree that floats.
+    """
     sums = sums or {}
     still = {*fixed, *sums}
     coefficients: dict[Expr, Expr] = {}
-    for term in terms:
+    for term in sp.Add.make_args(flat):
         moving = sp.Mul(*(f for f in sp.Mul.make_args(term) if not f.free_symbols <= still))
         coefficients[moving] = coefficients.get(moving, sp.Integer(0)) + term / moving
     coefficients = _with_cosines(coefficients)
     used = {s: e for s, e in sums.items() if any(c.has(s) for c in coefficients.values())}
     names = {total: symbol for symbol, total in used.items()}
-    parts = [
+    parts = (
         _factored(c.xreplace(used)).xreplace(names) * moving for moving, c in coefficients.items()
-    ]
-    whole = sp.Add(*parts)
-    least = min((whole, flat, expression), key=sp.count_ops)
-    return whole if sp.count_ops(whole) <= slack * sp.count_ops(least) else least
+    )
+    return sp.Add(*parts)
 
 
 def _with_cosines(coefficients: dict[Expr, Expr]) -> dict[Expr, Expr]:
@@ -168,3 +220,15 @@ def _joined(constant: Expr, slope: Expr, square: Expr) -> Expr:
     if bottom == under and not bottom.is_Number:
         return (top + rise * square) / bottom
     return constant + slope * square
+
+
+def is_sum_of_positive_terms(expression: Expr) -> bool:
+    """Whether an expression is built of positive symbols and even powers by +, *, / alone."""
+    if expression.is_Add or expression.is_Mul:
+        return all(is_sum_of_positive_terms(part) for part in expression.args)
+    if expression.is_Pow:
+        base, power = expression.args
+        if not power.is_Integer:
+            return False
+        return bool(power % 2 == 0 and base.is_real) or is_sum_of_positive_terms(base)
+    return bool(expression.is_positive)
