@@ -11,7 +11,7 @@ from eomgen.derivation.acting import used_bodies
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect, derived_effects
 from eomgen.derivation.evaluate import Numbers, array, define, follow, number
-from eomgen.derivation.frames import frames_of
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.own_names import own_name
 from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import reading_names
@@ -77,7 +77,7 @@ class LookedUp(dict[str, Any]):
                 self.lines.setdefault(symbol.name, []).append((line, i))
         self._busy: set[int] = set()
         self._given = names_of_scene(model)
-        self._frames = {frame.name: frame for frame in frames_of(model)}
+        self._frames = {frame.name: frame for frame in linkage_of(model).frames}
 
     def __missing__(self, name: str) -> Any:
         for line, i in reversed(self.lines.get(name, [])):
@@ -170,7 +170,7 @@ def _defined(line: Equation) -> Iterable[Any]:
 def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Numbers) -> None:
     """Poses, and what each effect says."""
     needed = dict.fromkeys(body for t in effects for body in used_bodies(t))
-    define(poses(model, frames_of(model), needed)[0], known)
+    define(poses(linkage_of(model), needed)[0], known)
     for body in needed if model.dimensions == 3 else ():
         entries = [[known[f"W_{body},{i}{j}"] for j in "xyz"] for i in "xyz"]
         known[f"W_{body}"] = np.array(entries)
@@ -181,14 +181,14 @@ def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Number
 
 def follow_recursion(model: Model, known: Numbers) -> tuple[list[float], list[float]]:
     """v̇ and F by the steps of the algorithm, in the order of v."""
-    frames = frames_of(model)
+    linkage = linkage_of(model)
     effects = derived_effects(model)
     follow_effects(model, effects, known)
-    for step in recursive_steps(model, frames, effects):
+    for step in recursive_steps(linkage, effects):
         follow(step.equations, known)
     rates: dict[str, float] = {}
     forces: dict[str, float] = {}
-    for frame in (frame for frame in frames if frame.free):
+    for frame in (frame for frame in linkage.frames if frame.free):
         several = len(frame.a) > 1
         found: Any = known[dotted(f"omega_{frame.name}") if several else frame.a[0].name]
         rates |= zip((a.name for a in frame.a), found.ravel(), strict=True)

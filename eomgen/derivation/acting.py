@@ -7,7 +7,7 @@ import sympy as sp
 
 from eomgen.derivation.constraints import DerivedConstraint
 from eomgen.derivation.effects import DerivedEffect, equations_of
-from eomgen.derivation.frames import frames_of
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.poses import poses
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import real
@@ -50,7 +50,7 @@ def effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator
             else "W rotates a body's axes into the world's, Ω is its angular velocity in world "
             "axes, x, y, z the position of its centre of mass."
         )
-        _, equations = poses(model, frames_of(model), needed)
+        _, equations = poses(linkage_of(model), needed)
         yield Step("pose", "Where the bodies are, and how they move", words, tuple(equations))
     for derived in parts.effects:
         lines = equations_of(derived.definitions)

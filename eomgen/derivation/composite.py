@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import sympy as sp
 
 from eomgen.derivation.effects import DerivedEffect
-from eomgen.derivation.frames import Frame
+from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.recursion import (
     FRAMES,
     VECTORS,
@@ -49,13 +49,11 @@ MASS = (
 )
 
 
-def composite_steps(
-    model: Model, frames: tuple[Frame, ...], effects: tuple[DerivedEffect, ...]
-) -> Iterator[Step]:
+def composite_steps(linkage: Linkage, effects: tuple[DerivedEffect, ...]) -> Iterator[Step]:
     """The steps to M and h."""
-    r = Recursion(model, frames, effects)
+    r = Recursion(linkage, effects)
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}")
-    order = range(len(frames))
+    order = range(len(r.frames))
     yield outward_step(r)
     lines = [line for k in reversed(order) for line in _bias(r, k)]
     yield Step("algorithm", "Inwards: the bias force", BIAS, tuple(lines))

@@ -12,9 +12,8 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import AnyLoad, DerivedEffect, named_loads
-from eomgen.derivation.frames import Frame, frames_of
 from eomgen.derivation.impacts import power
-from eomgen.derivation.linkage import quaternion_rates, rate
+from eomgen.derivation.linkage import Linkage, linkage_of
 from eomgen.derivation.mechanism import (
     AXES,
     NamingMechanism,
@@ -25,7 +24,8 @@ from eomgen.derivation.mechanism import (
     rotation_symbols,
     velocity_symbols,
 )
-from eomgen.derivation.poses import frame_name, poses
+from eomgen.derivation.poses import poses
+from eomgen.derivation.rotations import quaternion_rates, rate
 from eomgen.derivation.state_forms import needed_by
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr, real
@@ -82,7 +82,7 @@ def multiplier(row: str) -> Expr:
 
 def derived_constraints(model: Model) -> tuple[DerivedConstraint, ...]:
     """All constraints of a model, in order, without rows that follow from others."""
-    frames, found = frames_of(model), []
+    linkage, found = linkage_of(model), []
     for constraint in model.constraints:
         notes = Notes(constraint.name)
         list(constraint.rows(_mechanism(model, notes)))
@@ -92,7 +92,7 @@ def derived_constraints(model: Model) -> tuple[DerivedConstraint, ...]:
         kept = [(n, row) for n, row in zip(names, rows, strict=True) if n not in model.dropped]
         touched = [x.body for _, row in kept for x in row.loads if isinstance(x, Load)]
         bodies = tuple(dict.fromkeys(b for b in (*notes.bodies, *touched) if b != WORLD))
-        motion, moving = _Motion.of(model, frames, bodies).with_points(notes.definitions)
+        motion, moving = _Motion.of(linkage, bodies).with_points(notes.definitions)
         derived = tuple(_row(name, row, motion) for name, row in kept)
         speeds = needed_by([row.bend for row in derived], moving)
         force = _force(model, constraint, kept, bodies)
@@ -191,16 +191,16 @@ class _Motion:
     rates: Mapping[Expr, Expr]
 
     @classmethod
-    def of(cls, model: Model, frames: Sequence[Frame], bodies: Sequence[str]) -> "_Motion":
-        definitions, _ = poses(model, frames, bodies)
-        size = model.dimensions
+    def of(cls, linkage: Linkage, bodies: Sequence[str]) -> "_Motion":
+        definitions, _ = poses(linkage, bodies)
+        model, size = linkage.model, linkage.model.dimensions
         bodied = {b.name for b in model.bodies}
         moving: set[Expr] = set()
         rates: dict[Expr, Expr] = {real("t"): sp.S.One}
         rates |= coordinate_rates(model)
         known = {symbol for symbol, _ in definitions}
-        for frame in frames:
-            name = frame_name(model, frame)
+        for frame in linkage.frames:
+            name = linkage.name(frame)
             moving |= {real(dotted(f"o_{frame.name},{axis}")) for axis in AXES[:size]}
             moving |= {*omega_symbols(name, size), *velocity_symbols(name, size)}
             for axis in AXES[:size]:

@@ -12,7 +12,7 @@ import sympy as sp
 
 from eomgen.derivation.constraints import DerivedConstraint
 from eomgen.derivation.embedding import SHORT, projected, solved_for
-from eomgen.derivation.frames import frames_of
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.loops import entry
 from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.poses import poses
@@ -43,7 +43,7 @@ def of_freedoms(
     those of effects.
     """
     needed = dict.fromkeys(body for c in constraints for body in c.bodies)
-    placed, _ = poses(model, frames_of(model), needed)
+    placed, _ = poses(linkage_of(model), needed)
     points = (pair for c in constraints for pair in (*c.definitions, *c.speeds))
     names = _Names([*placed, *points])
     K, kappa = _motions(model, constraints, names)

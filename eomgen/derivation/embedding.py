@@ -16,7 +16,7 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.constraints import DerivedConstraint, DerivedRow
-from eomgen.derivation.frames import frames_of
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.poses import poses
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition
@@ -128,7 +128,7 @@ def _over_coordinates(
 ) -> tuple[Definition, ...]:
     """Poses and points of the constraints by coordinates, in order."""
     needed = dict.fromkeys(body for c in constraints for body in c.bodies)
-    found, _ = poses(model, frames_of(model), needed)
+    found, _ = poses(linkage_of(model), needed)
     return (*found, *(pair for c in constraints for pair in (*c.definitions, *c.speeds)))
 
 

@@ -13,8 +13,8 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.identity import identical
 from eomgen.derivation.lagrange import potential
-from eomgen.derivation.linkage import about, rate
 from eomgen.derivation.matrices import Matrices
+from eomgen.derivation.rotations import about, rate
 from eomgen.derivation.simplified import simplified
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, real

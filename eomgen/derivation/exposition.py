@@ -20,13 +20,13 @@ from eomgen.derivation.dependent_velocities import of_freedoms
 from eomgen.derivation.effects import DerivedEffect, derived_effects, with_symbols
 from eomgen.derivation.embedding import embedded, solved_for
 from eomgen.derivation.euler import euler_steps
-from eomgen.derivation.frames import frames_of
 from eomgen.derivation.handout.closed import collected_equations
 from eomgen.derivation.handout.closed import solved as solved_pins
 from eomgen.derivation.handout.steps import handout_steps, readable, symmetry_steps
 from eomgen.derivation.impacts import impact_steps
 from eomgen.derivation.kane import kane_written
 from eomgen.derivation.lagrange import lagrange_written
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.loops import (
     bias_of,
     constraint_steps,
@@ -333,12 +333,12 @@ def _of_tied(
 
 
 def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
-    frames = frames_of(model)
+    linkage = linkage_of(model)
     steps = [_state(model), Step("bodies", "Free bodies", _free_words(model), ())]
     effects = effect_steps(model, parts, every=True)
-    tree = ALGORITHMS[method or "newton-euler"](model, frames, parts.effects)
+    tree = ALGORITHMS[method or "newton-euler"](linkage, parts.effects)
     if not parts.constraints and method is None:
-        steps += [*effects, *recursive_steps(model, frames, parts.effects)]
+        steps += [*effects, *recursive_steps(linkage, parts.effects)]
     elif not parts.constraints:
         steps += [*effects, *tree, solved_algorithm(model)]
     elif model.groups:
@@ -402,7 +402,7 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
 def _whole(found: Matrices, model: Model, parts: Parts, following: int = 0) -> Matrices:
     """The matrices with the forces of effects written out, after `following` definitions."""
     needed = dict.fromkeys(body for derived in parts.effects for body in used_bodies(derived))
-    placed, _ = poses(model, frames_of(model), needed)
+    placed, _ = poses(linkage_of(model), needed)
     more = [*prescribed_motion(model), *placed]
     more += [pair for derived in parts.effects for pair in derived.definitions]
     if not more:

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import sympy as sp
 
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.projected.equations import armatures
 from eomgen.derivation.projected.steps import read_pairs, still_symbols
 from eomgen.derivation.reading import short_name
 from eomgen.derivation.steps import Pairs, Step
@@ -28,13 +27,13 @@ def kane_written(equations: ProjectedEquations) -> Iterator[Step]:
     still = still_symbols(equations)
     words = [short_name(v.name) for v in s.v]
     partial: Pairs = []
-    power = [armatures(model, s).get(j, sp.S.Zero) * a for j, a in enumerate(s.a)]
+    power = [equations.tree.armatures.get(j, sp.S.Zero) * a for j, a in enumerate(s.a)]
     for k, motion in enumerate(equations.motions):
-        body, c, own = model.bodies[k], equations.constraints[k], equations.bodies[k]
+        body, c, own = model.bodies[k], equations.constraints[k], equations.tree.bodies[k]
         omega, alpha, a = (
             x.xreplace(still) for x in (c.own.omega, c.own.alpha, c.own.acceleration)
         )
-        turned = own.moments * alpha + omega.cross(own.moments * omega)
+        turned = own.inertia * alpha + omega.cross(own.inertia * omega)
         for letter, motions, force, planar in (
             ("omega", motion.partial_omegas, turned, slice(2, 3)),
             ("u", motion.partial_velocities, own.mass * a, slice(0, 2)),

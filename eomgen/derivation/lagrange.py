@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import sympy as sp
 
-from eomgen.derivation.frames import Frame, frames_of
 from eomgen.derivation.identity import identical
-from eomgen.derivation.linkage import rate
+from eomgen.derivation.linkage import Frame, Linkage, linkage_of
 from eomgen.derivation.matrices import Matrices, written_out
 from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import short_name
+from eomgen.derivation.rotations import rate
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, real
@@ -107,12 +107,11 @@ def _energies(kinetic: Expr, potential: Expr) -> Iterator[tuple[str, Expr]]:
 def potential(model: Model, tree: Matrices, gravity: Expr) -> Expr:
     """U = -Σ m g·x over coordinates, and the entries of a ball's rotation."""
     known = {s.name: s for m in (tree.M, tree.G, gravity) for s in m.free_symbols}
-    frames = [_with_entries(model, frame) for frame in frames_of(model)]
-    bodies = [frame for frame in frames if frame.body >= 0]
-    names = [model.bodies[frame.body].name for frame in bodies]
-    definitions, _ = poses(model, frames, names)
-    total = sp.S.Zero
-    for frame, name in zip(bodies, names, strict=True):
+    frames = (_with_entries(model, frame) for frame in linkage_of(model).frames)
+    linkage, total = Linkage(model, tuple(frames)), sp.S.Zero
+    definitions, _ = poses(linkage, [body.name for body in model.bodies])
+    for frame in linkage.bodies:
+        name = linkage.name(frame)
         place = [real(f"{axis}_{name}") for axis in "xyz"[: model.dimensions]]
         total -= frame.mass * sum(g * x for g, x in zip(gravity, place, strict=False))
     whole = written_out(total, definitions)
@@ -128,10 +127,9 @@ def _with_entries(model: Model, frame: Frame) -> Frame:
     """A frame with symbols for the entries of a ball's rotation."""
     if frame.kind != "spherical":
         return frame
-    fixed = frame.rotation.xreplace(dict(zip(frame.q, (1, 0, 0, 0), strict=True)))
     name = model.bodies[frame.body].name
     entries = sp.Matrix(3, 3, lambda i, j: real(f"R__{name}__{'xyz'[i]}{'xyz'[j]}"))
-    return replace(frame, rotation=fixed * entries)
+    return replace(frame, turned=entries)
 
 
 def _slopes(tree: Matrices, e: Expr, rates: Mapping[Expr, Expr]) -> Expr:

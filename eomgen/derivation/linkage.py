@@ -1,21 +1,32 @@
-"""A mechanism's joints over symbols: rotations, what primitives do, and derivatives by time.
+"""A mechanism as a chain of frames with one joint primitive each, over symbols.
 
-Rotations take vectors of a body's axes to its parent's. All derivations read the joints here; they
-differ in what they do with them.
+All derivations read the mechanism here; they differ in the symbols that they take for quantities,
+and in how they go on from joints to bodies.
+
+The frame of a body has the body's axes and its origin at the body's joint. A joint with several
+primitives has a frame without mass for each but the last. A weld or a locked joint has a fixed one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import sympy as sp
 
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.mechanism import NamingMechanism, Notes
+from eomgen.derivation.rotations import about, of_quaternion, quaternion_scale
+from eomgen.derivation.steps import Definition
+from eomgen.derivation.symbols import Expr, real
 from eomgen.language.formula import Formula
 from eomgen.model.bodies import Body
+from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of, turns_of
 from eomgen.scalars.exact import Real, direction, orientation, quarters, radians
 from eomgen.scene.joints import Joint
-from eomgen.scene.joints.base import Primitive
+from eomgen.scene.joints.base import Primitive, WithRotor
+
+ORIGIN = sp.zeros(3, 1)
 
 
 class Quantities(Protocol):
@@ -28,63 +39,189 @@ class Quantities(Protocol):
         """A number."""
 
 
-def rate(e: Expr, rates: Mapping[Expr, Expr]) -> Expr:
-    """Time derivative of an expression or vector; symbols without a rate are constant. A sum that a
-    function depends on stays one: cos(θ + φ) gives -(θ̇ + φ̇) sin(θ + φ).
+@dataclass(frozen=True)
+class Frame:
+    """One frame; vectors have three components, in the plane the last of them 0.
+
+    name      that of the joint, with the number of the primitive unless it is the last
+    body      index of the body that it carries, -1 for none
+    parent    index of the parent's frame, -1 for the world
+    kind      of the joint primitive: "revolute", "prismatic", "spherical" or "fixed"
+    start     r_parent: from the centre of mass of the parent's body to the joint; 0 in later frames
+    axes      E, of the joint in the parent's at q = 0; 1 in later frames
+    turned    Q(q), the rotation by the primitive
+    slid      s(q), the displacement by the primitive, in axes of the joint
+    axis      unit vector of a revolute or prismatic primitive, in the frame's own axes
+    angle     of the whole rotation, in the plane
+    rotation  R = E Q, from the frame's own axes to the parent's
+    offset    r, from the parent's origin to its own, in the parent's axes
+    q, v      its coordinates and velocities; `given` if their motion is prescribed
+    a         the time derivatives of v
+    armature  reflected inertia of a motor's rotor
+    defined   a symbol in the rotation by a quaternion, and what it stands for
+    above     the centre of mass of the parent's body, from the parent's origin
+    mass, centre, inertia  of its body: inertia about the centre of mass
     """
-    if isinstance(e, sp.MatrixBase):
-        return e.applyfunc(lambda x: rate(x, rates))
-    if not rates.keys() & e.free_symbols:
-        return sp.S.Zero
-    if e.is_Symbol:
-        return rates[e]
-    if e.is_Add:
-        return sp.Add(*(rate(x, rates) for x in e.args))
-    if e.is_Mul:
-        factors = list(e.args)
-        terms = [(i, rate(x, rates)) for i, x in enumerate(factors)]
-        products = (sp.Mul(*factors[:i], x, *factors[i + 1 :]) for i, x in terms if x != 0)
-        return sp.Add(*products)
-    if isinstance(e, sp.Function) and len(e.args) == 1:
-        return e.fdiff() * rate(e.args[0], rates)
-    moving = sorted((s for s in e.free_symbols if s in rates), key=str)
-    return sp.Add(*(sp.diff(e, s) * rates[s] for s in moving))
+
+    name: str
+    joint: str
+    parent: int
+    kind: str
+    turned: Expr
+    slid: Expr
+    axis: Expr
+    angle: Expr
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    given: bool
+    armature: Expr
+    defined: tuple[Definition, ...]
+    start: Expr = field(default_factory=lambda: ORIGIN)
+    axes: Expr = field(default_factory=lambda: sp.eye(3))
+    above: Expr = field(default_factory=lambda: ORIGIN)
+    body: int = -1
+    mass: Expr = sp.S.Zero
+    centre: Expr = field(default_factory=lambda: ORIGIN)
+    inertia: Expr = field(default_factory=lambda: sp.zeros(3))
+
+    @property
+    def free(self) -> bool:
+        """Whether its velocities are unknown."""
+        return self.kind != "fixed" and not self.given
+
+    @property
+    def spin(self) -> Expr:
+        """The angular velocity on the parent, in the frame's own axes."""
+        if self.kind == "revolute":
+            return self.axis * self.v[0]
+        return sp.Matrix(self.v) if self.kind == "spherical" else ORIGIN
+
+    @cached_property
+    def rotation(self) -> Expr:
+        """R."""
+        return self.axes * self.turned
+
+    @cached_property
+    def offset(self) -> Expr:
+        """r."""
+        return self.start + self.above + self.axes * self.slid
 
 
-def quaternion_rates(q: Sequence[Expr], spin: Sequence[Expr]) -> tuple[Expr, ...]:
-    """½ q ∘ ω of w, x, y, z, with ω in the rotated axes."""
-    w, x, y, z = q
-    a, b, c = spin
-    half = sp.Rational(1, 2)
-    return (
-        -half * (x * a + y * b + z * c),
-        half * (w * a + y * c - z * b),
-        half * (w * b + z * a - x * c),
-        half * (w * c + x * b - y * a),
-    )
+@dataclass(frozen=True)
+class Linkage:
+    """A model by its frames, parents first."""
+
+    model: Model
+    frames: tuple[Frame, ...]
+
+    @cached_property
+    def bodies(self) -> tuple[Frame, ...]:
+        """The frame of each body."""
+        return tuple(frame for frame in self.frames if frame.body >= 0)
+
+    @cached_property
+    def joints(self) -> tuple[tuple[Frame, ...], ...]:
+        """The frames of each body's joint."""
+        names = [body.joint.name for body in self.model.bodies]
+        return tuple(tuple(f for f in self.frames if f.joint == name) for name in names)
+
+    def name(self, frame: Frame) -> str:
+        """The body that a frame carries; without one its own name."""
+        return self.model.bodies[frame.body].name if frame.body >= 0 else frame.name
 
 
-def quaternion_scale(q: Sequence[Expr]) -> Expr:
-    """2/|q|², by which a quaternion of any length gives a rotation; it has no rate."""
-    return 2 / sum(x**2 for x in q)
+def linkage_of(model: Model, quantities: Quantities | None = None) -> Linkage:
+    """The frames of a model, by default over the names of its scene."""
+    quantities = quantities or NamingMechanism(model, Notes())
+    found: list[Frame] = []
+    last: list[int] = []
+    for k, body in enumerate(model.bodies):
+        parent = last[body.parent] if body.parent >= 0 else -1
+        frames = [*_primitives(model, body, quantities)]
+        for i, frame in enumerate(frames, len(found)):
+            found.append(replace(frame, parent=i - 1 if frame is not frames[0] else parent))
+        first = len(found) - len(frames)
+        found[first] = _held(found[first], body.joint, found, quantities, model.dimensions)
+        last.append(len(found) - 1)
+        found[-1] = replace(
+            found[-1],
+            name=body.joint.name,
+            body=k,
+            mass=quantities.value(body.mass),
+            inertia=_inertia_of(body, quantities),
+            centre=-_vector(body.joint.r_child, quantities) if body.joint.holds else ORIGIN,
+        )
+    return Linkage(model, tuple(found))
 
 
-def primitive_motion(
+def _primitives(model: Model, body: Body, quantities: Quantities) -> Iterator[Frame]:
+    """A frame for each primitive of a body's joint, one that is fixed without any."""
+    joint, locked, states = body.joint, dict(model.locked), {c.name for c in model.velocities}
+    armature = sp.S.Zero
+    if joint.holds and isinstance(joint, WithRotor):
+        armature = quantities.value(joint.reflected_inertia)
+    for i, primitive in enumerate(joint.primitives(model.dimensions) or (None,)):
+        ball = primitive is not None and primitive.kind == "spherical"
+        own = slice(body.plain, None) if ball else slice(i, i + 1)
+        positions, velocities = body.positions[own], body.velocities[own]
+        held = [locked[c.name] for c in positions if c.name in locked]
+        q = tuple(sp.Float(x) for x in held) or tuple(real(c.name) for c in positions)
+        scale = real(f"k_{joint.name}")
+        turned, slid, axis = sp.eye(3), ORIGIN, ORIGIN
+        if primitive is not None:
+            turned, slid, axis = _motion(primitive, q, scale, quantities)
+        turns = primitive is not None and primitive.kind == "revolute"
+        yield Frame(
+            name=f"{joint.name}_{i + 1}",
+            joint=joint.name,
+            parent=-1,
+            kind="fixed" if held or primitive is None else primitive.kind,
+            turned=turned,
+            slid=slid,
+            axis=axis,
+            angle=axis[2] * q[0] if turns else sp.S.Zero,
+            q=() if held else q,
+            v=() if held else tuple(real(c.name) for c in velocities),
+            a=() if held else tuple(real(c.acceleration) for c in velocities),
+            given=bool(velocities) and velocities[0].name not in states and not held,
+            armature=armature,
+            defined=((scale, quaternion_scale(q)),) if ball else (),
+        )
+
+
+def _motion(
     primitive: Primitive, q: Sequence[Expr], scale: Expr, quantities: Quantities
 ) -> tuple[Expr, Expr, Expr]:
     """Rotation, displacement and axis of a joint primitive at its coordinates; `scale` is that of
     a quaternion.
     """
-    origin = sp.zeros(3, 1)
     if primitive.kind == "spherical":
-        return of_quaternion(q, scale), origin, origin
+        return of_quaternion(q, scale), ORIGIN, ORIGIN
     axis = sp.Matrix([quantities.number(part) for part in direction(primitive.axis)])
     if primitive.kind == "prismatic":
         return sp.eye(3), axis * q[0], axis
-    return about(axis, q[0]), origin, axis
+    return about(axis, q[0]), ORIGIN, axis
 
 
-def fixed_axes(joint: Joint, quantities: Quantities) -> Expr:
+def _held(
+    frame: Frame, joint: Joint, found: Sequence[Frame], quantities: Quantities, dimensions: int
+) -> Frame:
+    """The first frame of a joint where its parent holds it."""
+    above = found[frame.parent].centre if frame.parent >= 0 else ORIGIN
+    if not joint.holds:
+        return replace(frame, above=above)
+    turn = _fixed_angle(joint, quantities) if dimensions == 2 else sp.S.Zero
+    return replace(
+        frame,
+        start=_vector(joint.r_parent, quantities),
+        axes=_fixed_axes(joint, quantities),
+        angle=turn + frame.angle,
+        above=above,
+    )
+
+
+def _fixed_axes(joint: Joint, quantities: Quantities) -> Expr:
     """The axes of a joint at q = 0 in its parent's, by numbers or by formulas of parameters."""
     if joint.orientation is None:
         fixed = orientation(joint.orientation_deg)
@@ -104,7 +241,7 @@ def fixed_axes(joint: Joint, quantities: Quantities) -> Expr:
     return axes
 
 
-def fixed_angle(joint: Joint, quantities: Quantities) -> Expr:
+def _fixed_angle(joint: Joint, quantities: Quantities) -> Expr:
     """The angle of a joint's axes at q = 0 from its parent's, in the plane."""
     if joint.orientation is not None:
         return quantities.value(rows_of(joint.orientation)[0][0])
@@ -112,45 +249,16 @@ def fixed_angle(joint: Joint, quantities: Quantities) -> Expr:
     return count * sp.pi / 2 + quantities.number(rest)
 
 
-def vector(parts: tuple[Formula, ...], quantities: Quantities) -> Expr:
+def _vector(parts: tuple[Formula, ...], quantities: Quantities) -> Expr:
     """A vector with two or three components as one with three."""
     x, y, *z = (quantities.value(part) for part in parts)
     return sp.Matrix([x, y, *(z or [0])])
 
 
-def inertia_of(body: Body, quantities: Quantities) -> Expr:
+def _inertia_of(body: Body, quantities: Quantities) -> Expr:
     """Inertia about the centre of mass, body axes; in the plane only about z."""
     entries = [quantities.value(entry) for entry in body.inertia_com]
     if len(entries) == 1:
         return sp.diag(0, 0, entries[0])
     xx, yy, zz, xy, xz, yz = entries
     return sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def about(axis: Expr, angle: Expr) -> Expr:
-    """The rotation about a unit vector: n nᵀ + cos (1 - n nᵀ) + sin [n]x.
-
-    1 - n_x² is n_y² + n_z², of which nothing cancels where n is nearly x.
-    """
-    along = axis * axis.T
-    x, y, z = (along[i, i] for i in range(3))
-    across = sp.diag(y + z, x + z, x + y) + sp.diag(x, y, z) - along
-    return along + sp.cos(angle) * across + sp.sin(angle) * hat(axis)
-
-
-def hat(a: Sequence[Expr]) -> Expr:
-    """The matrix of a x."""
-    x, y, z = a
-    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-
-
-def of_quaternion(q: Sequence[Expr], k: Expr) -> Expr:
-    """The rotation of w, x, y, z with k = 2/|q|²: 1 + k (w [v]x + [v]x²), whatever its length."""
-    w, x, y, z = q
-    return sp.Matrix(
-        [
-            [1 - k * (y**2 + z**2), k * (x * y - w * z), k * (x * z + w * y)],
-            [k * (x * y + w * z), 1 - k * (x**2 + z**2), k * (y * z - w * x)],
-            [k * (x * z - w * y), k * (y * z + w * x), 1 - k * (x**2 + y**2)],
-        ]
-    )

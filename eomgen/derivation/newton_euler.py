@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.identity import identical
-from eomgen.derivation.linkage import rate
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.projected.equations import armatures
 from eomgen.derivation.projected.steps import (
     PARTS,
     PARTS_ARE,
@@ -25,6 +23,7 @@ from eomgen.derivation.projected.steps import (
     read_pairs,
     still_symbols,
 )
+from eomgen.derivation.rotations import rate
 from eomgen.derivation.steps import Pairs, Step
 from eomgen.derivation.symbols import Expr, real
 
@@ -72,10 +71,10 @@ def joint_forces(equations: ProjectedEquations) -> JointForces:
     rows: list[tuple[Expr, Expr]] = [(sp.S.Zero, sp.S.Zero)] * len(s.v)
     balances: list[Pairs] = []
     forces: Pairs = []
-    rotors = armatures(model, s)
+    rotors = equations.tree.armatures
     pulls: dict[int, list[tuple[Expr, Expr]]] = {}
     for k in reversed(range(len(model.bodies))):
-        body, c, own = model.bodies[k], equations.constraints[k], equations.bodies[k]
+        body, c, own = model.bodies[k], equations.constraints[k], equations.tree.bodies[k]
         omega, alpha, a = (
             x.xreplace(still) for x in (c.own.omega, c.own.alpha, c.own.acceleration)
         )
@@ -83,7 +82,7 @@ def joint_forces(equations: ProjectedEquations) -> JointForces:
         for force, torque in pulls.get(k, []):
             load, moment = load + force, moment + torque
         weight = own.mass * equations.motions[k].gravity
-        turned = own.moments * alpha + omega.cross(own.moments * omega)
+        turned = own.inertia * alpha + omega.cross(own.inertia * omega)
         name = body.joint.name
         f = sp.Matrix([real(f"f_{name},{x}") for x in "xyz"])
         n = sp.Matrix([real(f"n_{name},{x}") for x in "xyz"])
@@ -117,11 +116,10 @@ def joint_forces(equations: ProjectedEquations) -> JointForces:
 def _loads(equations: ProjectedEquations, k: int) -> tuple[Expr, Expr]:
     """Force and moment about the centre of mass of all loads on a body, in its axes."""
     force, moment = sp.zeros(3, 1), sp.zeros(3, 1)
-    back = equations.world.rotation(k).T
-    for body, at, outside, beside in (*equations.loads.gravity, *equations.loads.applied):
-        if body == k:
-            force += back * outside
-            moment += at.cross(back * outside) + back * beside
+    for load in (*equations.loads.gravity, *equations.loads.applied):
+        if load.body == k:
+            pull, turn = load.about_centre(equations.tree)
+            force, moment = force + pull, moment + turn
     return force, moment
 
 

@@ -16,8 +16,7 @@ import sympy as sp
 
 from eomgen.derivation.composite import outward_step
 from eomgen.derivation.effects import DerivedEffect
-from eomgen.derivation.frames import Frame
-from eomgen.derivation.linkage import hat
+from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.recursion import (
     FRAMES,
     VECTORS,
@@ -31,10 +30,10 @@ from eomgen.derivation.recursion import (
     velocities,
     wrench,
 )
+from eomgen.derivation.rotations import hat
 from eomgen.derivation.spatial import MotionCross
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.model.model import Model
 
 BY_KANE = (
     "Kane's equations for any tree: forces and inertia of all bodies, in the motions that each "
@@ -72,35 +71,31 @@ HAMEL = (
 )
 
 
-def kane_steps(
-    model: Model, frames: tuple[Frame, ...], effects: tuple[DerivedEffect, ...]
-) -> Iterator[Step]:
+def kane_steps(linkage: Linkage, effects: tuple[DerivedEffect, ...]) -> Iterator[Step]:
     """The steps to M and h_0 in partial velocities."""
-    r = Recursion(model, frames, effects)
+    r = Recursion(linkage, effects)
     yield from frame_steps(r, f"{BY_KANE}\n\n{VECTORS[r.size]}{FRAMES}")
     yield outward_step(r)
-    yield Step("algorithm", "Partial velocities", PARTIAL, tuple(_partial(r, f) for f in frames))
+    yield Step("algorithm", "Partial velocities", PARTIAL, tuple(_partial(r, f) for f in r.frames))
     needed = []
-    for frame in frames:
+    for frame in r.frames:
         terms = [r.vector("p", frame)]
         if frame.body >= 0:
             terms.insert(0, sp.MatMul(r.matrix("I", frame), r.vector("a", frame)))
         needed.append(sp.MatMul(_all(r, "P", frame).T, total(terms, r.size)))
     needed += [sp.MatMul(-1, x) for x in _own_loads(r)]
-    n = len(model.velocities)
+    n = len(r.model.velocities)
     bias = Equation(sp.MatrixSymbol("h_0", n, 1), total(needed, n))
     yield Step("algorithm", "Power of inertia and loads", POWER, (_mass(r), bias))
 
 
-def lagrange_steps(
-    model: Model, frames: tuple[Frame, ...], effects: tuple[DerivedEffect, ...]
-) -> Iterator[Step]:
+def lagrange_steps(linkage: Linkage, effects: tuple[DerivedEffect, ...]) -> Iterator[Step]:
     """The steps to M and h_0 from the energies."""
-    r = Recursion(model, frames, effects)
+    r = Recursion(linkage, effects)
     yield from frame_steps(r, f"{BY_LAGRANGE}\n\n{VECTORS[r.size]}{FRAMES}")
-    lines = [line for k in range(len(frames)) for line in _derivatives(r, k)]
+    lines = [line for k in range(len(r.frames)) for line in _derivatives(r, k)]
     yield Step("algorithm", "The energies and their derivatives", DERIVED, tuple(lines))
-    words = ENERGY + (HAMEL if any(len(f.v) > 1 for f in frames) else "")
+    words = ENERGY + (HAMEL if any(len(f.v) > 1 for f in r.frames) else "")
     if r.still:
         words += " The scene leaves the velocity forces out: V is 0."
     yield Step("algorithm", "Lagrange's equations", words, tuple(_lagrange(r)))

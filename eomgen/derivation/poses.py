@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.frames import Frame
+from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.mechanism import (
     AXES,
     crossed,
@@ -18,24 +18,21 @@ from eomgen.derivation.mechanism import (
 )
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr, real
-from eomgen.model.model import Model
 
 
-def poses(
-    model: Model, frames: Sequence[Frame], bodies: Collection[str]
-) -> tuple[list[Definition], list[Equation]]:
+def poses(linkage: Linkage, bodies: Collection[str]) -> tuple[list[Definition], list[Equation]]:
     """Pose and motion in the world of each of these bodies, with the frames between it and the
     world: as definitions in order, and as equations to be read.
     """
     needed: set[int] = set()
-    for k, frame in enumerate(frames):
-        if frame.body >= 0 and model.bodies[frame.body].name in bodies:
+    for k, frame in enumerate(linkage.frames):
+        if frame.body >= 0 and linkage.name(frame) in bodies:
             while k >= 0:
                 needed.add(k)
-                k = frames[k].parent
+                k = linkage.frames[k].parent
     collected = _Collected([], [], {})
     for k in sorted(needed):
-        _pose(model, frames, k, collected)
+        _pose(linkage, k, collected)
     return collected.definitions, collected.equations
 
 
@@ -62,26 +59,22 @@ class _Collected:
             self.equations.append(Equation(sp.Matrix(left), sp.Matrix(right)))
 
 
-def frame_name(model: Model, frame: Frame) -> str:
-    """The body that a frame carries; without one its own name."""
-    return model.bodies[frame.body].name if frame.body >= 0 else frame.name
-
-
-def _pose(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) -> None:
-    size, frame = model.dimensions, frames[k]
-    name = frame_name(model, frame)
+def _pose(linkage: Linkage, k: int, collected: _Collected) -> None:
+    frames, size = linkage.frames, linkage.model.dimensions
+    frame = frames[k]
+    name = linkage.name(frame)
     zero = (sp.Integer(0),) * size
     base: Expr = sp.eye(size)
     base_omega: tuple[Expr, ...] = zero[:1] if size == 2 else zero
     origin, speed = zero, zero
     parent = frames[frame.parent] if frame.parent >= 0 else None
     if parent is not None:
-        above = frame_name(model, parent)
+        above = linkage.name(parent)
         base, base_omega = rotation_symbols(above, size), omega_symbols(above, size)
         origin = tuple(real(f"o_{parent.name},{axis}") for axis in AXES[:size])
         speed = tuple(real(dotted(f"o_{parent.name},{axis}")) for axis in AXES[:size])
     named = frame.body >= 0
-    _define_rotation(model, frames, k, collected)
+    _define_rotation(linkage, k, collected)
     rotation, omega = rotation_symbols(name, size), omega_symbols(name, size)
     spin = _spin(frame, rotation, size)
     collected.define(omega, [a + b for a, b in zip(base_omega, spin, strict=True)], always=named)
@@ -105,11 +98,12 @@ def _pose(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) 
         collected.define(moving, [a + b for a, b in zip(own_speed, more, strict=True)], always=True)
 
 
-def _define_rotation(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) -> None:
+def _define_rotation(linkage: Linkage, k: int, collected: _Collected) -> None:
     """The angle of a planar frame, or the rotation matrix of one in space."""
-    frame, size = frames[k], model.dimensions
-    name, named = frame_name(model, frame), frame.body >= 0
-    above = frame_name(model, frames[frame.parent]) if frame.parent >= 0 else ""
+    frames, size = linkage.frames, linkage.model.dimensions
+    frame = frames[k]
+    name, named = linkage.name(frame), frame.body >= 0
+    above = linkage.name(frames[frame.parent]) if frame.parent >= 0 else ""
     if size == 2:
         base = real(f"psi_{above}") if above else sp.Integer(0)
         collected.define((real(f"psi_{name}"),), (base + frame.angle,), always=named)

@@ -13,10 +13,9 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
-from eomgen.derivation.frames import Frame
-from eomgen.derivation.linkage import hat
+from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes, rotation_symbols
-from eomgen.derivation.poses import frame_name
+from eomgen.derivation.rotations import hat
 from eomgen.derivation.spatial import (
     ForceCross,
     MotionCross,
@@ -61,9 +60,18 @@ KINDS = ("gravity", "applied")
 class Recursion:
     """The mechanism as the recursion reads it."""
 
-    model: Model
-    frames: tuple[Frame, ...]
+    linkage: Linkage
     effects: tuple[DerivedEffect, ...]
+
+    @property
+    def model(self) -> Model:
+        """Its model."""
+        return self.linkage.model
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """Its frames, parents first."""
+        return self.linkage.frames
 
     @property
     def size(self) -> int:
@@ -99,13 +107,11 @@ class Recursion:
         return [frame for frame in self.frames if frame.parent == k]
 
 
-def recursive_steps(
-    model: Model, frames: tuple[Frame, ...], effects: tuple[DerivedEffect, ...]
-) -> Iterator[Step]:
+def recursive_steps(linkage: Linkage, effects: tuple[DerivedEffect, ...]) -> Iterator[Step]:
     """The steps of the algorithm, frame by frame."""
-    r = Recursion(model, frames, effects)
+    r = Recursion(linkage, effects)
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}{PIVOTS}")
-    order = range(len(frames))
+    order = range(len(r.frames))
     lines = [line for k in order for line in velocities(r, k)]
     yield Step("algorithm", "Outwards: velocities and bias forces", outward_words(r), tuple(lines))
     words = (
@@ -164,7 +170,7 @@ def frame_steps(r: Recursion, words: str) -> Iterator[Step]:
 def _kind(r: Recursion, k: int) -> str:
     frame = r.frames[k]
     above = f"`{r.frames[frame.parent].name}`" if frame.parent >= 0 else f"the {WORLD}"
-    carries = f", carries `{frame_name(r.model, frame)}`" if frame.body >= 0 else ", without mass"
+    carries = f", carries `{r.linkage.name(frame)}`" if frame.body >= 0 else ", without mass"
     moved = {
         "revolute": "turns about", "prismatic": "slides along", "spherical": "turns freely",
         "fixed": "fixed",
@@ -296,7 +302,7 @@ def wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Exp
     """The loads on a frame's body as spatial forces at its origin, in its axes."""
     if frame.body < 0:
         return []
-    name, size = frame_name(r.model, frame), r.model.dimensions
+    name, size = r.linkage.name(frame), r.model.dimensions
     found: list[Expr] = []
     for derived in r.effects:
         if derived.falls:

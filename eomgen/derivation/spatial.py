@@ -6,7 +6,7 @@ plane three, [ω_z; v_x; v_y] and [n_z; f_x; f_y].
 
 import sympy as sp
 
-from eomgen.derivation.linkage import hat
+from eomgen.derivation.rotations import hat
 from eomgen.derivation.symbols import Expr
 
 PLANAR = (2, 3, 4)

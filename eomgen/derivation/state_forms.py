@@ -9,7 +9,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.forms import state_form
-from eomgen.derivation.linkage import quaternion_rates
+from eomgen.derivation.rotations import quaternion_rates
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model

@@ -20,14 +20,13 @@ from eomgen.codegen.from_closed_form import from_closed_form, of_projected
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
-from eomgen.derivation.linkage import hat, rate
-from eomgen.derivation.projected.constraints import state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
-from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.rewriting import gathered, sum_of_squares
+from eomgen.derivation.rotations import hat, rate
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
-from eomgen.derivation.symbols import OF_SCENE, make_symbols, of_scene
+from eomgen.derivation.symbols import OF_SCENE, of_scene
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -297,8 +296,8 @@ def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -
 def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
     """[ω]x = Qᵀ Q', with Q' by the coordinates' own rates, for every joint of a random tree."""
     model = tree(seed, SPACE, 3)
-    symbols = make_symbols(model)
-    ledger = Ledger(symbols.fixed, 20, 160)
+    stated = Tree.of(model, 20, 160)
+    symbols, ledger = stated.symbols, stated.ledger
     rng = np.random.default_rng(seed)
     numbers = {s: float(rng.uniform(-1, 1)) for s in (*symbols.q, *symbols.v)}
     for four in model.quaternions:
@@ -307,7 +306,7 @@ def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
             numbers[symbols.q[i]] /= length
     numbers |= {symbol: float(x) for x, symbol in symbols.numbers.items()}
     coordinates = {*symbols.q, *symbols.numbers.values()}
-    for c in state_joints(model, symbols, ledger):
+    for c in stated.constraints:
         written = c.rotation
         while not written.free_symbols <= coordinates:
             written = written.xreplace(ledger.definitions)

@@ -17,7 +17,7 @@ from eomgen.derivation.constraints import DerivedConstraint, derived_constraints
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.evaluate import Numbers, array, define, number
 from eomgen.derivation.exposition import exposition_of
-from eomgen.derivation.frames import frames_of
+from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.loops import by_independent_velocities, elimination_steps
 from eomgen.derivation.poses import poses
 from eomgen.dynamics.loops import constraints as solved
@@ -82,7 +82,7 @@ def followed(model: Model, seed: int = 0) -> tuple[Instant, tuple[DerivedConstra
     """A closed state with all that the steps on constraints define."""
     at, found = instant(model, seed, 0.05, closed=True), derived_constraints(model)
     needed = dict.fromkeys(body for c in found for body in c.bodies)
-    define(poses(model, frames_of(model), needed)[0], at.known)
+    define(poses(linkage_of(model), needed)[0], at.known)
     for c in found:
         define((*c.definitions, *c.speeds), at.known)
     return at, found

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, rotate, scale
-from eomgen.derivation.linkage import rate
+from eomgen.derivation.linkage import linkage_of
+from eomgen.derivation.rotations import rate
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
-from eomgen.scene.joints import Joint
 
 
 @dataclass(frozen=True)
@@ -37,22 +37,19 @@ def differentiate_joints(model: Model, symbols: BodySymbols) -> Kinematics:
     for orders in ((symbols.q, symbols.v, symbols.a), (symbols.x, symbols.xd, symbols.xdd),
                    (symbols.y, symbols.yd, symbols.ydd)):  # fmt: skip
         rates |= zip((*orders[0], *orders[1]), (*orders[1], *orders[2]), strict=True)
-    zero = (sp.S.Zero, sp.S.Zero)
     angles: list[Expr] = []
     arms: list[tuple[Vec, Vec]] = []
     positions: list[Vec] = []
-    for body, last in zip(model.bodies, model.angle_index, strict=True):
-        base = angles[body.parent] if body.parent >= 0 else sp.S.Zero
-        angles.append(base + symbols.q[last])
-        if not body.joint.holds:
-            arms.append((zero, zero))
-            positions.append((symbols.q[last - 2], symbols.q[last - 1]))
-            continue
-        parent = (symbols.x[body.parent], symbols.y[body.parent]) if body.parent >= 0 else zero
-        r_parent = rotate(_vector(symbols, body.joint, "r_parent"), base)
-        r_child = rotate(_vector(symbols, body.joint, "r_child"), angles[-1])
+    for body, joint in zip(model.bodies, linkage_of(model, symbols).joints, strict=True):
+        base, above = sp.S.Zero, (sp.S.Zero, sp.S.Zero)
+        if body.parent >= 0:
+            base, above = angles[body.parent], (symbols.x[body.parent], symbols.y[body.parent])
+        angles.append(base + sum(frame.angle for frame in joint))
+        x, y, _ = sum((frame.slid for frame in joint), sp.zeros(3, 1))
+        r_parent = rotate(tuple(joint[0].start[:2]), base)
+        r_child = rotate(tuple(-joint[-1].centre[:2, :]), angles[-1])
         arms.append((r_parent, r_child))
-        positions.append(add(parent, add(r_parent, scale(-1, r_child))))
+        positions.append(add((x, y), add(above, add(r_parent, scale(-1, r_child)))))
     omegas = [rate(angle, rates) for angle in angles]
     velocities = [_rates(r, rates) for r in positions]
     return Kinematics(
@@ -69,8 +66,3 @@ def differentiate_joints(model: Model, symbols: BodySymbols) -> Kinematics:
 
 def _rates(vector: Vec, rates: dict[Expr, Expr]) -> Vec:
     return rate(vector[0], rates), rate(vector[1], rates)
-
-
-def _vector(symbols: BodySymbols, joint: Joint, field: str) -> Vec:
-    x, y = getattr(joint, field)
-    return (symbols.value(x), symbols.value(y))

@@ -13,22 +13,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.linkage import (
-    fixed_angle,
-    fixed_axes,
-    hat,
-    primitive_motion,
-    quaternion_rates,
-    quaternion_scale,
-    rate,
-    vector,
-)
+from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.projected.ledger import Ledger, triple
+from eomgen.derivation.rotations import hat, quaternion_rates, rate
 from eomgen.derivation.symbols import Expr, Symbols, real
-from eomgen.model.model import Body, Model
-from eomgen.scalars.exact import direction
-from eomgen.scene.joints import Joint
-from eomgen.scene.joints.base import Primitive
 
 
 @dataclass(frozen=True)
@@ -70,45 +58,35 @@ class Constraint:
     acceleration: Expr
 
 
-def state_joints(model: Model, symbols: Symbols, ledger: Ledger) -> tuple[Constraint, ...]:
+def state_joints(linkage: Linkage, symbols: Symbols, ledger: Ledger) -> tuple[Constraint, ...]:
     """State every joint's constraint and differentiate it; long rotations get definitions."""
     found: list[Constraint] = []
     at_rest = MotionSymbols(*(sp.zeros(3, 1) for _ in range(4)))
-    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
-    for body, i, j in starts:
-        q = symbols.q[i : i + len(body.positions)]
-        v = symbols.v[j : j + len(body.velocities)]
-        a = symbols.a[j : j + len(body.velocities)]
+    ledger.rates.update(zip(symbols.v, symbols.a, strict=True))
+    for body, joint in zip(linkage.model.bodies, linkage.joints, strict=True):
         parent = found[body.parent].own if body.parent >= 0 else at_rest
-        words = ("omega", "u", "alpha", "a")
-        own = MotionSymbols(*(triple(word, body.name) for word in words))
-        ledger.rates.update(zip(v, a, strict=True))
+        own = MotionSymbols(*(triple(word, body.name) for word in ("omega", "u", "alpha", "a")))
         ledger.rates.update(zip(own.omega, own.alpha, strict=True))
-        found.append(_differentiated(body, model, symbols, q, v, parent, own, ledger))
+        planar = linkage.model.dimensions == 2
+        found.append(_differentiated(body.name, joint, parent, own, ledger, planar=planar))
     return tuple(found)
 
 
 def _differentiated(
-    body: Body,
-    model: Model,
-    symbols: Symbols,
-    q: Sequence[Expr],
-    v: Sequence[Expr],
+    name: str,
+    joint: Sequence[Frame],
     parent: MotionSymbols,
     own: MotionSymbols,
     ledger: Ledger,
+    *,
+    planar: bool,
 ) -> Constraint:
-    joint = body.joint
-    axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
-    if joint.holds:
-        axes = fixed_axes(joint, symbols)
-        r_parent, arm = vector(joint.r_parent, symbols), vector(joint.r_child, symbols)
-    primitives = joint.primitives(model.dimensions)
-    rotation, relative_omega, slide = _relative_motion(body.name, primitives, q, v, symbols, ledger)
-    if primitives and not all(_simple(primitive) for primitive in primitives):
-        rotation = _entries(body.name, rotation, relative_omega, ledger)
+    rotation, relative_omega, slide = _relative_motion(name, joint, ledger)
+    if not all(_simple(frame) for frame in joint):
+        rotation = _entries(name, rotation, relative_omega, ledger)
+    axes, arm = joint[0].axes, -joint[-1].centre
     inward, back = axes.T, rotation.T
-    reach = inward * r_parent + slide
+    reach = inward * joint[0].start + slide
     base = inward * parent.omega
 
     def in_joint(r: Expr) -> Expr:
@@ -125,7 +103,7 @@ def _differentiated(
         reach=reach,
         arm=arm,
         relative_omega=relative_omega,
-        axis_angle=_axis_angle_of(joint, primitives, q, symbols, model.dimensions),
+        axis_angle=_axis_angle_of(joint, planar=planar),
         parent=parent,
         own=own,
         omega=omega,
@@ -136,78 +114,51 @@ def _differentiated(
     )
 
 
-def _relative_motion(
-    name: str,
-    primitives: Sequence[Primitive],
-    q: Sequence[Expr],
-    v: Sequence[Expr],
-    symbols: Symbols,
-    ledger: Ledger,
-) -> tuple[Expr, Expr, Expr]:
-    """Rotation, angular velocity in the rotated axes, and displacement of a sequence of primitives;
-    also registers q'.
+def _relative_motion(name: str, joint: Sequence[Frame], ledger: Ledger) -> tuple[Expr, Expr, Expr]:
+    """Rotation, angular velocity in the rotated axes, and displacement by all primitives of a
+    joint; also registers q'.
     """
     rotation, relative_omega, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
-    q, v = list(q), list(v)
-    for primitive in primitives:
-        own, spin, scale = q[:1], v[:1], sp.S.One
-        if primitive.kind == "spherical":
-            own, spin = q[:4], v[:3]
-            scale = ledger.define(real(f"k__{name}"), quaternion_scale(own))
-            ledger.rates.update(zip(own, quaternion_rates(own, spin), strict=True))
+    for frame in joint:
+        turned = frame.turned
+        if frame.kind == "spherical":
+            ((scale, value),) = frame.defined
+            turned = turned.xreplace({scale: ledger.define(real(f"k__{name}"), value)})
+            ledger.rates.update(zip(frame.q, quaternion_rates(frame.q, frame.v), strict=True))
         else:
-            ledger.rates[own[0]] = spin[0]
-        rotated_by, moved, axis = primitive_motion(primitive, own, scale, symbols)
-        if primitive.kind == "prismatic":
-            slide += rotation * moved
-        else:
-            turning = axis * spin[0] if primitive.kind == "revolute" else sp.Matrix(spin)
-            rotation, relative_omega = (
-                rotation * rotated_by,
-                rotated_by.T * relative_omega + turning,
-            )
-        q, v = q[len(own) :], v[len(spin) :]
+            ledger.rates.update(zip(frame.q, frame.v, strict=True))
+        slide += rotation * frame.slid
+        rotation, relative_omega = rotation * turned, turned.T * relative_omega + frame.spin
     return rotation, relative_omega, slide
 
 
-def _axis_angle_of(
-    joint: Joint,
-    primitives: Sequence[Primitive],
-    q: Sequence[Expr],
-    symbols: Symbols,
-    dimensions: int,
-) -> tuple[Expr, Expr] | None:
+def _axis_angle_of(joint: Sequence[Frame], *, planar: bool) -> tuple[Expr, Expr] | None:
     """Coordinate axis and angle of a joint whose rotations are all about one axis; angle 0 if none.
 
     Angles about one axis add, also over several joints.
     """
     axis, angle = sp.zeros(3, 1), sp.Integer(0)
-    degrees = joint.orientation_deg
-    if joint.orientation is not None:
-        if dimensions == 3:
-            return None
-        axis, angle = sp.Matrix([0, 0, 1]), fixed_angle(joint, symbols)
-    elif dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
-        axis, angle = sp.Matrix([0, 0, 1]), fixed_angle(joint, symbols)
-    elif degrees not in (0.0, (0.0, 0.0, 0.0)):
+    if planar:
+        angle = sum((frame.angle for frame in joint), angle)
+        return (sp.Matrix([0, 0, 1]) if angle != 0 else axis), angle
+    if joint[0].axes != sp.eye(3):
         return None
-    for primitive, coordinate in zip(primitives, q, strict=False):  # a spin has four
-        if primitive.kind == "prismatic":
+    for frame in joint:
+        if frame.kind not in ("revolute", "spherical"):
             continue
-        along = sp.Matrix([int(part != 0) for part in primitive.axis])
-        if not _simple(primitive) or (any(axis) and along != axis):
+        along = frame.axis.applyfunc(lambda part: int(part != 0))
+        if not _simple(frame) or (any(axis) and along != axis):
             return None
-        sign = sum(symbols.number(part) for part in direction(primitive.axis))
-        axis, angle = along, angle + sign * coordinate
+        axis, angle = along, angle + sum(frame.axis) * frame.q[0]
     return axis, angle
 
 
-def _simple(primitive: Primitive) -> bool:
-    """Whether each entry of a primitive's rotation has at most one sine or cosine, as for prismatic
-    primitives and rotations about coordinate axes.
+def _simple(frame: Frame) -> bool:
+    """Whether each entry of a frame's rotation has at most one sine or cosine, as where it slides
+    or turns about a coordinate axis.
     """
-    along = sum(part != 0.0 for part in primitive.axis) == 1
-    return primitive.kind == "prismatic" or (primitive.kind == "revolute" and along)
+    along = sum(part != 0 for part in frame.axis) == 1
+    return frame.kind in ("prismatic", "fixed") or (frame.kind == "revolute" and along)
 
 
 def _entries(name: str, rotation: Expr, relative_omega: Expr, ledger: Ledger) -> Expr:

@@ -5,22 +5,14 @@ method).
 from dataclasses import dataclass, replace
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.projected.constraints import Constraint, state_joints
-from eomgen.derivation.projected.equations import (
-    Balance,
-    Inertia,
-    Loads,
-    Motion,
-    World,
-    balance,
-    body_motions,
-    inertias,
-    loads,
-)
+from eomgen.derivation.projected.constraints import Constraint
+from eomgen.derivation.projected.equations import Balance, Motion, balance, body_motions
 from eomgen.derivation.projected.ledger import Ledger
+from eomgen.derivation.projected.loads import Loads, loads_of
 from eomgen.derivation.projected.solution import Solution, solve
+from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
-from eomgen.derivation.symbols import Symbols, make_symbols
+from eomgen.derivation.symbols import Symbols
 from eomgen.model.model import Model
 
 WRITTEN, NAMED = (20, 160), (6, 40)
@@ -29,22 +21,37 @@ WRITTEN, NAMED = (20, 160), (6, 40)
 
 @dataclass(frozen=True)
 class ProjectedEquations:
-    """A model's equations of motion: constraints, motions, M v̇ + V + G = F, and v̇.
+    """A model's equations of motion: its tree, motions, M v̇ + V + G = F, and v̇.
 
     `balance` is written over the first `motion_definitions` of `solution`.
     """
 
-    model: Model
-    symbols: Symbols
-    bodies: tuple[Inertia, ...]
-    constraints: tuple[Constraint, ...]
+    tree: Tree
     motions: tuple[Motion, ...]
     loads: Loads
     balance: Balance
     motion_definitions: int
     solution: Solution
-    world: World
-    ledger: Ledger
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.tree.model
+
+    @property
+    def symbols(self) -> Symbols:
+        """The symbols of the model."""
+        return self.tree.symbols
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The joints as constraints, by body."""
+        return self.tree.constraints
+
+    @property
+    def ledger(self) -> Ledger:
+        """Definitions, and rates of symbols."""
+        return self.tree.ledger
 
 
 def derive_projected(model: Model) -> ProjectedEquations:
@@ -56,8 +63,7 @@ def derive_projected(model: Model) -> ProjectedEquations:
 
 def solved(e: ProjectedEquations) -> ProjectedEquations:
     """The same with their solution."""
-    found = solve(e.model, e.symbols, e.bodies, e.motions, e.loads, e.world, e.ledger)
-    return replace(e, solution=found)
+    return replace(e, solution=solve(e.tree, e.motions, e.loads))
 
 
 def balanced(model: Model) -> ProjectedEquations:
@@ -67,17 +73,10 @@ def balanced(model: Model) -> ProjectedEquations:
     """
     if why_not := why_not_closed(model):
         raise SceneError(f"route: 'closed' does not derive this scene: {why_not}")
-    symbols = make_symbols(model)
-    few = len(model.velocities) <= FEW_VELOCITIES
-    ledger = Ledger(symbols.fixed, *(WRITTEN if few else NAMED))
-    bodies = inertias(model, symbols)
-    constraints = state_joints(model, symbols, ledger)
-    applied_loads = loads(model, symbols, bodies, ledger)
-    world = World(model, constraints, ledger)
-    motions = body_motions(model, constraints, applied_loads.uniform, world, ledger, symbols)
-    equations = balance(model, symbols, bodies, motions, applied_loads, world, ledger)
-    before = len(ledger.definitions)
-    return ProjectedEquations(
-        *(model, symbols, bodies, constraints, motions, applied_loads, equations, before),
-        *(Solution(ledger.definitions, (), ()), world, ledger),
-    )
+    tree = Tree.of(model, *(WRITTEN if len(model.velocities) <= FEW_VELOCITIES else NAMED))
+    loads = loads_of(tree)
+    motions = body_motions(tree, loads.uniform)
+    equations = balance(tree, motions, loads)
+    definitions = tree.ledger.definitions
+    unsolved = Solution(definitions, (), ())
+    return ProjectedEquations(tree, motions, loads, equations, len(definitions), unsolved)

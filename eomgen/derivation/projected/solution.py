@@ -20,17 +20,13 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.projected.equations import (
-    Inertia,
-    Loads,
-    Motion,
-    World,
-    armatures,
-    generalised,
-)
+from eomgen.derivation.linkage import Frame
+from eomgen.derivation.projected.equations import Motion, generalised
 from eomgen.derivation.projected.ledger import Ledger
+from eomgen.derivation.projected.loads import Loads
+from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.rewriting import is_sum_of_positive_terms, nested, sum_of_squares
-from eomgen.derivation.symbols import Expr, Symbols
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 
@@ -76,14 +72,18 @@ class Solution:
 class Elimination:
     """The state of an elimination: rows, forces on the velocities, and what is known so far."""
 
-    symbols: Symbols
-    ledger: Ledger
-    rows: list[Row]
+    tree: Tree
     forces: dict[int, Expr]
+    rows: list[Row] = field(default_factory=list)
     sums: dict[Expr, Expr] = field(default_factory=dict)
     pivots: list[Expr] = field(default_factory=list)
     weights: list[Expr] = field(default_factory=list)
     divisors: list[tuple[str, Expr]] = field(default_factory=list)
+
+    @property
+    def ledger(self) -> Ledger:
+        """The definitions so far."""
+        return self.tree.ledger
 
     def short(self, expression: Expr) -> Expr:
         """The expression simplified, with constant pivots substituted where terms then cancel."""
@@ -101,35 +101,27 @@ class Elimination:
             symbol = form
         else:
             symbol = self.ledger.define(sp.Symbol(name, positive=True), form)
-            if form.free_symbols <= {*self.symbols.fixed, *self.sums, *self.weights}:
+            if form.free_symbols <= {*self.ledger.fixed, *self.sums, *self.weights}:
                 self.sums[symbol] = form.xreplace(self.sums)
         self.pivots.append(symbol)
         return symbol
 
 
-def solve(
-    model: Model,
-    symbols: Symbols,
-    bodies: Sequence[Inertia],
-    motions: Sequence[Motion],
-    applied_loads: Loads,
-    world: World,
-    ledger: Ledger,
-) -> Solution:
+def solve(tree: Tree, motions: Sequence[Motion], loads: Loads) -> Solution:
     """Solve for v̇ under the effects and further generalised forces `tau`."""
-    work = Elimination(symbols, ledger, [], {})
-    _set_forces(model, symbols, bodies, motions, applied_loads, world, work)
+    work = Elimination(tree, _forces(tree, motions, loads))
+    model, ledger, a = tree.model, tree.ledger, tree.symbols.a
     roots = model.roots
     translations = []
-    for k, (body, motion) in enumerate(zip(bodies, motions, strict=True)):
+    for k, (body, motion) in enumerate(zip(tree.bodies, motions, strict=True)):
         floats = not model.bodies[roots[k]].joint.holds
-        work.rows += _angular_rows(model, k, body, motion, work)
+        work.rows += _angular_rows(k, motion, work)
         if not floats:
             work.rows += _linear_rows(body, motion, work)
         elif roots[k] == k:
-            tree = [i for i, root in enumerate(roots) if root == k]
-            translations.append(_eliminate_translation(model, tree, bodies, motions, world, work))
-    for j, inertia in armatures(model, symbols).items():
+            members = [i for i, root in enumerate(roots) if root == k]
+            translations.append(_eliminate_translation(members, motions, work))
+    for j, inertia in tree.armatures.items():
         work.rows.append(Row(inertia, {j: sp.Integer(1)}, sp.Integer(0)))
     carried = {
         model.first_velocity[translation.root] + i
@@ -141,9 +133,9 @@ def solve(
         if j not in carried:
             answers[j] = _eliminate(j, work)
     for j in reversed(answers):  # the last one eliminated is known first
-        ledger.define(symbols.a[j], answers[j])
+        ledger.define(a[j], answers[j])
     for translation in translations:
-        _define_translation(model, symbols, translation, applied_loads.uniform, world, ledger)
+        _define_translation(tree, translation, loads.uniform)
     return Solution(ledger.definitions, tuple(work.pivots), tuple(work.divisors))
 
 
@@ -159,38 +151,28 @@ def _inwards(model: Model) -> list[int]:
     return order
 
 
-def _set_forces(
-    model: Model,
-    symbols: Symbols,
-    bodies: Sequence[Inertia],
-    motions: Sequence[Motion],
-    applied_loads: Loads,
-    world: World,
-    work: Elimination,
-) -> None:
-    """Set the generalised forces: all except uniform gravity, minus gyroscopic torques ω x I ω."""
-    forces = dict(enumerate(symbols.tau))
-    for j, force in applied_loads.motors.items():
+def _forces(tree: Tree, motions: Sequence[Motion], loads: Loads) -> dict[int, Expr]:
+    """The generalised forces: all except uniform gravity, minus gyroscopic torques ω x I ω."""
+    forces = dict(enumerate(tree.symbols.tau))
+    for j, force in loads.motors.items():
         forces[j] += force
-    for load in (*applied_loads.gravity, *applied_loads.applied):
-        for j, part in generalised(model, motions, world, load).items():
+    for load in (*loads.gravity, *loads.applied):
+        for j, part in generalised(tree, motions, load).items():
             forces[j] += part
-    for body, motion in zip(bodies, motions, strict=True):
-        torque = motion.omega.cross(body.moments * motion.omega)
+    for body, motion in zip(tree.bodies, motions, strict=True):
+        torque = motion.omega.cross(body.inertia * motion.omega)
         for j, partial_omega in motion.partial_omegas.items():
-            forces[j] -= work.short(partial_omega.dot(torque))
-    work.forces = forces
+            forces[j] -= tree.ledger.short(partial_omega.dot(torque))
+    return forces
 
 
-def _angular_rows(
-    model: Model, k: int, body: Inertia, motion: Motion, work: Elimination
-) -> list[Row]:
+def _angular_rows(k: int, motion: Motion, work: Elimination) -> list[Row]:
     """Three squares of a body's rotation: I = Lᵀ D L, weights D, entries L times partial ω."""
-    name = model.bodies[k].name
-    values = [model.value(entry) for entry in model.bodies[k].inertia_com[:3]]
+    body, model = work.tree.model.bodies[k], work.tree.model
+    name, values = body.name, [model.value(entry) for entry in body.inertia_com[:3]]
     # From the largest moment down: it is not 0 unless all are.
     order = sorted(range(3), key=lambda i: -values[i]) if len(values) == 3 else [2]
-    left, rows = sp.Matrix(body.moments), []
+    left, rows = sp.Matrix(work.tree.bodies[k].inertia), []
     for i in order:
         others = [h for h in order[order.index(i) + 1 :] if left[i, h] != 0]
         weight = left[i, i]
@@ -219,7 +201,7 @@ def _angular_rows(
     return [row for row in rows if row.entries]
 
 
-def _linear_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
+def _linear_rows(body: Frame, motion: Motion, work: Elimination) -> list[Row]:
     """Three squares of a body's centre of mass, in its axes."""
     if body.mass == 0:
         return []
@@ -237,50 +219,47 @@ def _linear_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
 
 
 def _eliminate_translation(
-    model: Model,
-    tree: Sequence[int],
-    bodies: Sequence[Inertia],
-    motions: Sequence[Motion],
-    world: World,
-    work: Elimination,
+    members: Sequence[int], motions: Sequence[Motion], work: Elimination
 ) -> Translation:
     """Eliminate a floating tree's translation, and add the rows of its bodies that are left."""
-    root, ledger, name = tree[0], work.ledger, model.bodies[tree[0]].name
+    tree, ledger, root = work.tree, work.tree.ledger, members[0]
+    model, bodies, v = tree.model, tree.bodies, tree.symbols.v
+    name = model.bodies[root].name
     first = model.first_velocity[root]
     carried = range(first, first + model.dimensions)
-    total = sum((bodies[k].mass for k in tree), sp.Integer(0))
+    total = sum((bodies[k].mass for k in members), sp.Integer(0))
     mass = work.pivot(f"mass__{name}", total)
     whole = {mass: total} if mass != total else {}
     work.sums |= whole
     columns = dict.fromkeys(
-        j for k in tree for j in motions[k].partial_velocities if j not in carried
+        j for k in members for j in motions[k].partial_velocities if j not in carried
     )
     none = sp.zeros(3, 1)
 
     def mean(word: str, vectors: dict[int, Expr]) -> Expr:
         joined = sp.zeros(3, 1)
         for k, vector in vectors.items():
-            joined += bodies[k].mass / mass * (world.rotation(k, root) * vector)
+            joined += bodies[k].mass / mass * (tree.rotation(k, root) * vector)
         return ledger.vector(word, name, joined.applyfunc(work.short))
 
     means = {
         j: mean(
-            f"mean__{work.symbols.v[j].name}",
-            {k: motions[k].partial_velocities.get(j, none) for k in tree},
+            f"mean__{v[j].name}",
+            {k: motions[k].partial_velocities.get(j, none) for k in members},
         )
         for j in columns
     }
-    bias = mean("bias", {k: motions[k].acceleration for k in tree})
+    bias = mean("bias", {k: motions[k].acceleration for k in members})
     force = sp.Matrix([*(work.forces[j] for j in carried), *([0] * (3 - len(carried)))])
-    pushed = world.rotation(root).T * force
+    pushed = tree.rotation(root).T * force
     for j, part in means.items():
         work.forces[j] -= part.dot(pushed)
-    for k in (k for k in tree if bodies[k].mass != 0):
-        back = world.rotation(k, root).T
+    for k in (k for k in members if bodies[k].mass != 0):
+        back = tree.rotation(k, root).T
         body = model.bodies[k].name
         apart = {
             j: ledger.vector(
-                f"apart__{work.symbols.v[j].name}",
+                f"apart__{v[j].name}",
                 body,
                 (motions[k].partial_velocities.get(j, none) - back * means[j]).applyfunc(
                     work.short
@@ -296,29 +275,24 @@ def _eliminate_translation(
     return Translation(root, mass, {j: m for j, m in means.items() if any(m)}, bias, force)
 
 
-def _define_translation(
-    model: Model,
-    symbols: Symbols,
-    translation: Translation,
-    uniform: Expr,
-    world: World,
-    ledger: Ledger,
-) -> None:
+def _define_translation(tree: Tree, translation: Translation, uniform: Expr) -> None:
     """The acceleration of a floating tree's root: the whole tree's, minus that from other v̇."""
+    a = tree.symbols.a
     inside = -translation.bias
     for j, part in translation.mean.items():
-        inside -= part * symbols.a[j]
-    first = model.first_velocity[translation.root]
+        inside -= part * a[j]
+    first = tree.model.first_velocity[translation.root]
     outside = (
-        uniform + translation.force / translation.mass + world.rotation(translation.root) * inside
+        uniform + translation.force / translation.mass + tree.rotation(translation.root) * inside
     )
-    for i in range(model.dimensions):
-        ledger.define(symbols.a[first + i], outside[i])
+    for i in range(tree.model.dimensions):
+        tree.ledger.define(a[first + i], outside[i])
 
 
 def _eliminate(k: int, work: Elimination) -> Expr:
     """Eliminate v̇_k; return it as an expression in the v̇ that are left."""
-    name = work.symbols.v[k].name
+    v, a = work.tree.symbols.v, work.tree.symbols.a
+    name = v[k].name
     here = [row for row in work.rows if k in row.entries]
     pivot = work.pivot(f"pivot__{name}", sum(row.weight * row.entries[k] ** 2 for row in here))
     columns = sorted({j for row in here for j in row.entries if j != k})
@@ -327,11 +301,11 @@ def _eliminate(k: int, work: Elimination) -> Expr:
         joint = sum(
             row.weight * row.entries[k] * row.entries[j] for row in here if j in row.entries
         )
-        found = work.named(f"coupling__{name}__{work.symbols.v[j].name}", joint / pivot)
+        found = work.named(f"coupling__{name}__{v[j].name}", joint / pivot)
         if found != 0:
             coupling[j] = found
     held = work.short(sum(row.weight * row.entries[k] * row.bias for row in here))
-    known = sum((c * work.symbols.a[j] for j, c in coupling.items()), sp.Integer(0))
+    known = sum((c * a[j] for j, c in coupling.items()), sp.Integer(0))
     force = work.forces[k]
     if not coupling:  # no row is left that would need β
         for row in here:
@@ -341,13 +315,13 @@ def _eliminate(k: int, work: Elimination) -> Expr:
     force = work.forces[k] = work.named(f"load__{name}", force)
     bias = work.named(f"bias__{name}", held / pivot)
     for n, row in enumerate(here):
-        a = row.entries.pop(k)
+        own = row.entries.pop(k)
         for j, c in coupling.items():
-            rest = work.short(row.entries.get(j, sp.Integer(0)) - a * c)
-            row.entries[j] = work.ledger.named(f"row__{name}__{n}__{work.symbols.v[j].name}", rest)
+            rest = work.short(row.entries.get(j, sp.Integer(0)) - own * c)
+            row.entries[j] = work.ledger.named(f"row__{name}__{n}__{v[j].name}", rest)
         row.entries = {j: e for j, e in row.entries.items() if e != 0}
         if row.entries:
-            row.bias = work.named(f"rest__{name}__{n}", row.bias - a * bias)
+            row.bias = work.named(f"rest__{name}__{n}", row.bias - own * bias)
     work.rows = [row for row in work.rows if row.entries]
     for j, c in coupling.items():
         work.forces[j] -= c * force
