@@ -16,7 +16,7 @@ from eomgen.derivation.handout.elimination import (
 from eomgen.derivation.handout.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.handout.kinematics import Kinematics, differentiate_joints
 from eomgen.derivation.handout.solution import Definition, Solution, solve
-from eomgen.derivation.handout.symbols import BodySymbols, body_symbols, over_bodies
+from eomgen.derivation.handout.symbols import BodySymbols, body_symbols
 from eomgen.derivation.rewriting import by_variables, tidy
 from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr
@@ -33,14 +33,22 @@ class Equations:
     as definitions over the accelerations.
     """
 
-    model: Model
-    symbols: BodySymbols
     kinematics: Kinematics
     free_bodies: FreeBodies
     collected: Collected
     symmetric: Collected
     solution: Solution
     joint_force: tuple[Definition, ...]
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.kinematics.model
+
+    @property
+    def symbols(self) -> BodySymbols:
+        """Its symbols."""
+        return self.kinematics.symbols
 
 
 def derive(model: Model) -> Equations:
@@ -52,11 +60,10 @@ def derive(model: Model) -> Equations:
 
 def solved(equations: Equations) -> Equations:
     """The same with their solution."""
-    model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
-    rows = equations.collected
-    right_side = body_rows(model, kinematics, rows.F - rows.V - rows.G)
-    right_side += _generalised_forces(model, symbols)
-    return replace(equations, solution=solve(model, symbols, kinematics, right_side))
+    rows, kin = equations.collected, equations.kinematics
+    right_side = body_rows(kin, rows.F - rows.V - rows.G)
+    right_side += _generalised_forces(kin.model, kin.symbols)
+    return replace(equations, solution=solve(kin, right_side))
 
 
 def collected_equations(model: Model) -> Equations:
@@ -66,24 +73,13 @@ def collected_equations(model: Model) -> Equations:
     """
     if why_not := why_not_pins(model):
         raise SceneError(f"route: 'closed' does not derive this scene: {why_not}")
-    symbols = body_symbols(model)
-    kinematics = differentiate_joints(model, symbols)
-    free_bodies = draw_free_bodies(model, symbols, kinematics)
-    collected = collect(model, symbols, kinematics, free_bodies)
-    generalised = Collected(
-        *(symmetric(model, symbols, kinematics, m) for m in
-          (collected.M, collected.V, collected.G, collected.F))
-    )  # fmt: skip
-    return Equations(
-        model,
-        symbols,
-        kinematics,
-        free_bodies,
-        collected,
-        generalised,
-        Solution((), (), ()),
-        _recovered_forces(model, symbols, free_bodies),
-    )
+    kin = differentiate_joints(model, body_symbols(model))
+    free_bodies = draw_free_bodies(kin)
+    collected = collect(kin, free_bodies)
+    whole = (collected.M, collected.V, collected.G, collected.F)
+    generalised = Collected(*(symmetric(kin, matrix) for matrix in whole))
+    forces = _recovered_forces(kin, free_bodies)
+    return Equations(kin, free_bodies, collected, generalised, Solution((), (), ()), forces)
 
 
 def _generalised_forces(model: Model, symbols: BodySymbols) -> Expr:
@@ -95,22 +91,18 @@ def _generalised_forces(model: Model, symbols: BodySymbols) -> Expr:
     return sp.Matrix(rows)
 
 
-def _recovered_forces(
-    model: Model, symbols: BodySymbols, free_bodies: FreeBodies
-) -> tuple[Definition, ...]:
-    residuals = []
-    for k in range(len(model.bodies)):
+def _recovered_forces(kin: Kinematics, free_bodies: FreeBodies) -> tuple[Definition, ...]:
+    model, residuals = kin.model, []
+    for k, ((x, y), _) in enumerate(kin.inertial):
         (wx, wy), (fx, fy) = free_bodies.gravity[k][0], free_bodies.applied[k][0]
-        residuals.append(
-            (symbols.mass[k] * symbols.xdd[k] - wx - fx, symbols.mass[k] * symbols.ydd[k] - wy - fy)
-        )
+        residuals.append((x - wx - fx, y - wy - fy))
     found = joint_forces(model, residuals)
     return tuple(
         (symbol, expression)
         for tree in trees(model)
         for k in tree.bodies
         if model.bodies[k].joint.holds
-        for symbol, expression in zip(symbols.force[k], found[k], strict=True)
+        for symbol, expression in zip(kin.symbols.force[k], found[k], strict=True)
     )
 
 
@@ -135,8 +127,7 @@ def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
     In m ẍ + m g the weight that ẍ contains cancels in numbers, which loses digits of a small force
     on a heavy body. Written out and collected it cancels symbolically.
     """
-    model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
-    inward = over_bodies(model, symbols)
+    model, symbols, kin = equations.model, equations.symbols, equations.kinematics
     found = dict(equations.solution.definitions)
     sums = dict(equations.solution.masses)
     definitions = []
@@ -146,7 +137,7 @@ def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
             if not model.bodies[k].joint.holds:
                 inner = (found[ddx], found[ddy])
             else:
-                inner = tuple(e.xreplace(inward) for e in kinematics.acceleration[k])
+                inner = tuple(e.xreplace(kin.inward) for e in kin.acceleration[k])
             expression = expression.xreplace({ddx: inner[0], ddy: inner[1]})
         definitions.append((symbol, by_variables(tidy(expression), symbols.fixed, sums)))
     return tuple(definitions)

@@ -8,12 +8,9 @@ import sympy as sp
 from eomgen.derivation.handout.free_bodies import FreeBodies, Wrench
 from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.handout.symbols import (
-    BodySymbols,
     Vec,
     add,
     cross,
-    over_bodies,
-    over_coordinates,
     scale,
 )
 from eomgen.derivation.rewriting import tidy
@@ -88,22 +85,16 @@ def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
     return forces
 
 
-def collect(
-    model: Model, symbols: BodySymbols, kinematics: Kinematics, free_bodies: FreeBodies
-) -> Collected:
+def collect(kin: Kinematics, free_bodies: FreeBodies) -> Collected:
     """Eliminate f_j and the dependent accelerations, and collect (24)."""
-    inertial = tuple(
-        ((symbols.mass[k] * symbols.xdd[k], symbols.mass[k] * symbols.ydd[k]),
-         symbols.inertia[k] * kinematics.alpha[k])
-        for k in range(len(model.bodies))
-    )  # fmt: skip
+    model, symbols = kin.model, kin.symbols
     # In the bodies' own angles and rates, expanding does not break up terms such as (θ̇ + φ̇)².
     # (22) and (23) are substituted from the leaves to the root.
-    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
-    rows = [row.xreplace(inward) for row in rows_without_forces(model, kinematics, inertial)]
+    inward, outward = kin.inward, kin.outward
+    rows = [row.xreplace(inward) for row in rows_without_forces(kin, kin.inertial)]
     for k in reversed(range(len(model.bodies))):
         if model.bodies[k].joint.holds:
-            ddx, ddy = (e.xreplace(inward) for e in kinematics.acceleration[k])
+            ddx, ddy = (e.xreplace(inward) for e in kin.acceleration[k])
             rows = [row.xreplace({symbols.xdd[k]: ddx, symbols.ydd[k]: ddy}) for row in rows]
     rows = [sp.expand(row) for row in rows]
     unknowns = (*symbols.xdd, *symbols.ydd, *symbols.alpha)
@@ -116,18 +107,17 @@ def collect(
             slope = sp.diff(row, z).xreplace(outward)
             for j, a in enumerate(symbols.a):
                 mass[i, j] += slope * over.coeff(a)
-    gravity = -sp.Matrix(rows_without_forces(model, kinematics, free_bodies.gravity))
-    applied = sp.Matrix(rows_without_forces(model, kinematics, free_bodies.applied))
+    gravity = -sp.Matrix(rows_without_forces(kin, free_bodies.gravity))
+    applied = sp.Matrix(rows_without_forces(kin, free_bodies.applied))
     return Collected(mass, velocity, gravity, applied)
 
 
-def rows_without_forces(
-    model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]
-) -> list[Expr]:
+def rows_without_forces(kin: Kinematics, wrenches: Sequence[Wrench]) -> list[Expr]:
     """The rows that the elimination gives for one wrench on each body, one for each coordinate.
 
     The elimination is linear, so inertia, gravity and applied forces pass through it one by one.
     """
+    model = kin.model
     forces = joint_forces(model, [force for force, _ in wrenches])
     floating = {tree.root: tree for tree in trees(model) if tree.floating}
     rows: list[Expr] = []
@@ -139,15 +129,15 @@ def rows_without_forces(
             rows += total
         row = wrenches[k][1]
         if k in forces:
-            row += cross(kinematics.arm_child[k], forces[k])
+            row += cross(kin.arm_child[k], forces[k])
         for c, child in enumerate(model.bodies):
             if child.parent == k:
-                row -= cross(kinematics.arm_parent[c], forces[c])
+                row -= cross(kin.arm_parent[c], forces[c])
         rows.append(row)
     return rows
 
 
-def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
+def body_rows(kin: Kinematics, rows: Expr) -> Expr:
     """The rows of (24) as equations of virtual work, one for each body.
 
     To each torque row of a floating tree the moment of the total force is added, with the arm from
@@ -155,7 +145,7 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
     of a rotation of this body, which carries everything outside it along. Rows of trees on the
     world are this already.
     """
-    result = sp.Matrix(rows)
+    model, result = kin.model, sp.Matrix(rows)
     for tree in trees(model):
         if not tree.floating:
             continue
@@ -164,25 +154,25 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
         for k in tree.bodies:
             arm: Vec = (sp.Integer(0), sp.Integer(0))
             if k != tree.root:
-                arm = add(arm, scale(-1, kinematics.arm_child[k]))
+                arm = add(arm, scale(-1, kin.arm_child[k]))
             for c, child in enumerate(model.bodies):
                 if child.parent == k:
-                    arm = add(arm, kinematics.arm_parent[c])
+                    arm = add(arm, kin.arm_parent[c])
             angle_row = model.angle_index[k]
             for j in range(result.cols):
                 result[angle_row, j] += cross(arm, (result[x, j], result[y, j]))
     return result
 
 
-def symmetric(model: Model, symbols: BodySymbols, kinematics: Kinematics, rows: Expr) -> Expr:
+def symmetric(kin: Kinematics, rows: Expr) -> Expr:
     """The rows of (24) as generalised forces: ½ q̇ᵀ M q̇ is the kinetic energy.
 
     The coordinate of a joint rotates its whole subtree, so its row is the sum of the subtree's.
     """
-    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
-    work = body_rows(model, kinematics, rows).applyfunc(lambda e: tidy(e.xreplace(inward)))
+    model = kin.model
+    work = body_rows(kin, rows).applyfunc(lambda e: tidy(e.xreplace(kin.inward)))
     result = sp.Matrix(work)
     for k, i in enumerate(model.angle_index):
         for j in range(work.cols):
             result[i, j] = sum(work[model.angle_index[b], j] for b in subtree(model, k))
-    return result.xreplace(outward)
+    return result.xreplace(kin.outward)

@@ -11,7 +11,6 @@ import sympy as sp
 
 from eomgen.base.errors import SceneError
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.handout.symbols import over_bodies, over_coordinates
 from eomgen.derivation.symbols import Expr
 from eomgen.model.states import State, velocity_states
 from eomgen.scene.joints.base import WORLD
@@ -44,7 +43,7 @@ def state_form(equations: Equations) -> StateForm:
 
 def _velocity_form(equations: Equations) -> StateForm:
     symbols = equations.symbols
-    turned = over_coordinates(equations.model, symbols)
+    turned = equations.kinematics.outward
     return StateForm(
         states=velocity_states(equations.model),
         symbols=(*symbols.q, *symbols.v),
@@ -61,7 +60,7 @@ def _velocity_form(equations: Equations) -> StateForm:
 def _positions(equations: Equations) -> dict[Expr, Expr]:
     """Position and velocity of every body by those of its parent: (21) and its derivative."""
     symbols, kinematics = equations.symbols, equations.kinematics
-    inward = over_bodies(equations.model, symbols)
+    inward = kinematics.inward
     defined: dict[Expr, Expr] = {}
     model = equations.model
     for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
@@ -77,7 +76,7 @@ def _positions(equations: Equations) -> dict[Expr, Expr]:
 
 def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
     model, symbols = equations.model, equations.symbols
-    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
+    inward, outward = equations.kinematics.inward, equations.kinematics.outward
     states: list[State] = []
     own: list[Expr] = []
     rates: list[Expr] = []
@@ -130,7 +129,7 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
 
 def _over_q(equations: Equations, expressions: list[Expr]) -> tuple[Expr, ...]:
     """Expressions of body symbols over `q` and `v` alone."""
-    outward = over_coordinates(equations.model, equations.symbols)
+    outward = equations.kinematics.outward
     positions = _positions(equations)
     result = []
     for expression in expressions:

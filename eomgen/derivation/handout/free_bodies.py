@@ -7,10 +7,9 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.handout.kinematics import Kinematics
-from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, cross, rotate, scale
+from eomgen.derivation.handout.symbols import Vec, add, cross, rotate, scale
 from eomgen.derivation.joint_loads import joint_loads, mechanism_over
 from eomgen.derivation.symbols import Expr
-from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 
 Wrench = tuple[Vec, Expr]
@@ -35,11 +34,12 @@ class FreeBodies:
     potential_energy: Expr
 
 
-def draw_free_bodies(model: Model, symbols: BodySymbols, kinematics: Kinematics) -> FreeBodies:
+def draw_free_bodies(kin: Kinematics) -> FreeBodies:
     """Write m ẍ = Σ f and I ψ̈ = Σ r × f for every body.
 
     The joint force f_j acts on the parent at r_parent, and -f_j on the child at r_child.
     """
+    model, symbols = kin.model, kin.symbols
     mechanism: Any = mechanism_over(model, symbols, symbols.y)
     loads = [load for effect in model.effects for load in effect.loads(mechanism)]
     forces = [load for load in loads if isinstance(load, Load)]
@@ -47,34 +47,30 @@ def draw_free_bodies(model: Model, symbols: BodySymbols, kinematics: Kinematics)
     torques, efforts = joint_loads(model, symbols, at_joints)
     motor = tuple(torques.get(last, sp.Integer(0)) for last in model.angle_index)
     still = (sp.Integer(0),) * len(model.bodies)
-    gravity = _wrenches(model, kinematics, (f for f in forces if f.kind == "gravity"), still)
-    applied = _wrenches(model, kinematics, (f for f in forces if f.kind == "applied"), motor)
+    gravity = _wrenches(kin, (f for f in forces if f.kind == "gravity"), still)
+    applied = _wrenches(kin, (f for f in forces if f.kind == "applied"), motor)
     equations = []
     for k, body in enumerate(model.bodies):
         force, torque = add(gravity[k][0], applied[k][0]), gravity[k][1] + applied[k][1]
         if body.joint.holds:
             reaction = scale(-1, symbols.force[k])
             force = add(force, reaction)
-            torque += cross(kinematics.arm_child[k], reaction)
+            torque += cross(kin.arm_child[k], reaction)
         for c, child in enumerate(model.bodies):
             if child.parent == k:
                 force = add(force, symbols.force[c])
-                torque += cross(kinematics.arm_parent[c], symbols.force[c])
-        equations += [
-            (symbols.mass[k] * symbols.xdd[k], force[0]),
-            (symbols.mass[k] * symbols.ydd[k], force[1]),
-            (symbols.inertia[k] * kinematics.alpha[k], torque),
-        ]
+                torque += cross(kin.arm_parent[c], symbols.force[c])
+        (x, y), turning = kin.inertial[k]
+        equations += [(x, force[0]), (y, force[1]), (turning, torque)]
     potential = sum((e.potential_energy(mechanism) for e in model.effects), sp.Integer(0))
     return FreeBodies(gravity, applied, motor, efforts, tuple(equations), potential)
 
 
-def _wrenches(
-    model: Model, kinematics: Kinematics, loads: Iterable[Load], motor: Sequence[Expr]
-) -> tuple[Wrench, ...]:
+def _wrenches(kin: Kinematics, loads: Iterable[Load], motor: Sequence[Expr]) -> tuple[Wrench, ...]:
+    model = kin.model
     forces = {body.name: (sp.Integer(0), sp.Integer(0)) for body in model.bodies}
     torques = {body.name: torque for body, torque in zip(model.bodies, motor, strict=True)}
-    angles = {body.name: kinematics.angle[k] for k, body in enumerate(model.bodies)}
+    angles = {body.name: kin.angle[k] for k, body in enumerate(model.bodies)}
     for k, body in enumerate(model.bodies):  # (35): +τ on the child, -τ on the parent
         if body.parent >= 0:
             torques[model.bodies[body.parent].name] -= motor[k]

@@ -1,10 +1,19 @@
 """Kinematics of the bodies: the joint constraint, differentiated twice (handout (18)-(23))."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import sympy as sp
 
-from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, rotate, scale
+from eomgen.derivation.handout.symbols import (
+    BodySymbols,
+    Vec,
+    add,
+    over_bodies,
+    over_coordinates,
+    rotate,
+    scale,
+)
 from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.rotations import rate
 from eomgen.derivation.symbols import Expr
@@ -13,7 +22,7 @@ from eomgen.model.model import Model
 
 @dataclass(frozen=True)
 class Kinematics:
-    """The motion of every body in terms of its parent's.
+    """The motion of every body of a model in terms of its parent's.
 
     `angle`, `omega`, `alpha` are sums of coordinates, velocities and accelerations along the path
     to the world. `position` is (21), x_B = x_A + r_A - r_B, with x_A the parent's own symbol;
@@ -21,6 +30,8 @@ class Kinematics:
     r_A and r_B in world axes (18), (19).
     """
 
+    model: Model
+    symbols: BodySymbols
     angle: tuple[Expr, ...]
     omega: tuple[Expr, ...]
     alpha: tuple[Expr, ...]
@@ -29,6 +40,24 @@ class Kinematics:
     position: tuple[Vec, ...]
     velocity: tuple[Vec, ...]
     acceleration: tuple[Vec, ...]
+
+    @property
+    def inertial(self) -> tuple[tuple[Vec, Expr], ...]:
+        """m ẍ and I ψ̈ of every body."""
+        s = self.symbols
+        forces = [(m * x, m * y) for m, x, y in zip(s.mass, s.xdd, s.ydd, strict=True)]
+        torques = [i * alpha for i, alpha in zip(s.inertia, self.alpha, strict=True)]
+        return tuple(zip(forces, torques, strict=True))
+
+    @cached_property
+    def inward(self) -> dict[Expr, Expr]:
+        """Coordinates and their derivatives by those of the bodies."""
+        return over_bodies(self.model, self.symbols)
+
+    @cached_property
+    def outward(self) -> dict[Expr, Expr]:
+        """The inverse."""
+        return over_coordinates(self.model, self.symbols)
 
 
 def differentiate_joints(model: Model, symbols: BodySymbols) -> Kinematics:
@@ -53,6 +82,8 @@ def differentiate_joints(model: Model, symbols: BodySymbols) -> Kinematics:
     omegas = [rate(angle, rates) for angle in angles]
     velocities = [_rates(r, rates) for r in positions]
     return Kinematics(
+        model,
+        symbols,
         angle=tuple(angles),
         omega=tuple(omegas),
         alpha=tuple(rate(omega, rates) for omega in omegas),

@@ -19,7 +19,7 @@ import sympy as sp
 
 from eomgen.derivation.handout.elimination import Tree, trees
 from eomgen.derivation.handout.kinematics import Kinematics
-from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, over_bodies, scale
+from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, scale
 from eomgen.derivation.rewriting import by_variables, is_sum_of_positive_terms, tidy
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
@@ -85,23 +85,22 @@ class _Notes:
         return self.define(symbol, expression)
 
 
-def solve(model: Model, symbols: BodySymbols, kinematics: Kinematics, right_side: Expr) -> Solution:
+def solve(kin: Kinematics, right_side: Expr) -> Solution:
     """Solve for all accelerations.
 
     `right_side` is F - V - G in the rows of `body_rows`. The definitions end with the accelerations
     `xdd`, `ydd`, `alpha` of every body and `a` of every coordinate, over the symbols `x`, `y`,
     `angle`, `xd`, `yd`, `omega` of the bodies.
     """
-    notes = _Notes()
-    absolute = over_bodies(model, symbols)
+    notes, model, symbols = _Notes(), kin.model, kin.symbols
     for tree in trees(model):
-        _solve_tree(model, symbols, kinematics, tree, right_side, absolute, notes)
+        _solve_tree(kin, tree, right_side, notes)
     for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
         if len(body.positions) > 1:
             notes.define(symbols.a[last - 2], symbols.xdd[k])
             notes.define(symbols.a[last - 1], symbols.ydd[k])
         else:
-            ddx, ddy = (e.xreplace(absolute) for e in kinematics.acceleration[k])
+            ddx, ddy = (e.xreplace(kin.inward) for e in kin.acceleration[k])
             notes.define(symbols.xdd[k], ddx)
             notes.define(symbols.ydd[k], ddy)
         base = symbols.alpha[body.parent] if body.parent >= 0 else sp.Integer(0)
@@ -109,22 +108,15 @@ def solve(model: Model, symbols: BodySymbols, kinematics: Kinematics, right_side
     return Solution(tuple(notes.definitions), tuple(notes.pivots), tuple(notes.masses))
 
 
-def _solve_tree(
-    model: Model,
-    symbols: BodySymbols,
-    kinematics: Kinematics,
-    tree: Tree,
-    right_side: Expr,
-    absolute: dict[Expr, Expr],
-    notes: _Notes,
-) -> None:
+def _solve_tree(kin: Kinematics, tree: Tree, right_side: Expr, notes: _Notes) -> None:
+    model, symbols = kin.model, kin.symbols
     # ∂ẍ/∂α of each body, and so the two squares of its centre of mass.
     carried: dict[int, dict[int, Vec]] = {}
     for k in tree.bodies:
         parent = model.bodies[k].parent
         entries = dict(carried.get(parent, {}))
         if not (tree.floating and k == tree.root):
-            ddx, ddy = (e.xreplace(absolute) for e in kinematics.acceleration[k])
+            ddx, ddy = (e.xreplace(kin.inward) for e in kin.acceleration[k])
             for i in tuple(dict.fromkeys((parent, k))):
                 if i >= 0:
                     old = entries.get(i, (sp.Integer(0), sp.Integer(0)))
@@ -132,11 +124,11 @@ def _solve_tree(
                     entries[i] = (old[0] + slope[0], old[1] + slope[1])
         carried[k] = {i: e for i, e in entries.items() if e != (0, 0)}
     pairs = [_Pair(symbols.mass[k], carried[k]) for k in tree.bodies]
-    load = {k: tidy(right_side[model.angle_index[k]].xreplace(absolute)) for k in tree.bodies}
+    load = {k: tidy(right_side[model.angle_index[k]].xreplace(kin.inward)) for k in tree.bodies}
     root = model.bodies[tree.root].name
     if tree.floating:
         x = model.angle_index[tree.root] - 2
-        push = tuple(tidy(right_side[x + i].xreplace(absolute)) for i in (0, 1))
+        push = tuple(tidy(right_side[x + i].xreplace(kin.inward)) for i in (0, 1))
         total, moment, pairs = _eliminate_translation(pairs)
         tree_mass = notes.fresh(f"mass__{root}", total, positive=True)
         notes.pivots.append(tree_mass)

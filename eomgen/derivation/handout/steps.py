@@ -198,20 +198,12 @@ def _eliminated(equations: Equations) -> Iterator[Titled]:
     if not equations.joint_force:
         return
     yield "", "balance", "The joint forces", f"{force}.", list(equations.joint_force)
-    bodies = range(len(model.bodies))
-    inertia = [
-        ((s.mass[k] * s.xdd[k], s.mass[k] * s.ydd[k]), s.inertia[k] * kin.alpha[k]) for k in bodies
-    ]
-    left = rows_without_forces(model, kin, inertia)
+    left = rows_without_forces(kin, kin.inertial)
     free = equations.free_bodies
-    right = [
-        sum(pair)
-        for pair in zip(
-            rows_without_forces(model, kin, free.gravity),
-            rows_without_forces(model, kin, free.applied),
-            strict=True,
-        )
-    ]
+    pairs = zip(
+        rows_without_forces(kin, free.gravity), rows_without_forces(kin, free.applied), strict=True
+    )
+    right = [sum(pair) for pair in pairs]
     yield (
         "",
         "balance",
@@ -312,7 +304,7 @@ SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
 def symmetry_steps(equations: Equations) -> Iterator[Step]:
     """How the handout's M becomes the symmetric one of the generated module."""
     n, s = len(equations.symbols.a), equations.symmetric
-    by = symmetric(equations.model, equations.symbols, equations.kinematics, sp.eye(n))
+    by = symmetric(equations.kinematics, sp.eye(n))
     if by == sp.eye(n):
         return
     own = (("M", s.M), ("V", s.V), ("G", s.G), ("F", s.F))
