@@ -118,7 +118,7 @@ class Derivation(Displayed):
         """An expression over q, v, t, inputs and parameters alone: all other symbols, as those of
         forces or of what constraints determine, are replaced by what they stand for.
         """
-        from eomgen.derivation.matrices import written_out
+        from eomgen.derivation.definitions import written_out
 
         return written_out(expression, self.matrices.definitions)
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.definitions import needed_by
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import AnyLoad, DerivedEffect, named_loads
 from eomgen.derivation.impacts import power
@@ -26,7 +27,6 @@ from eomgen.derivation.mechanism import (
 )
 from eomgen.derivation.poses import poses
 from eomgen.derivation.rotations import quaternion_rates, rate
-from eomgen.derivation.state_forms import needed_by
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model

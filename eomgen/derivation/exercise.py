@@ -8,8 +8,9 @@ import sympy as sp
 
 from eomgen.base.displays import Displayed
 from eomgen.base.errors import SceneError
+from eomgen.derivation.definitions import written_out, written_size
 from eomgen.derivation.exposition import Exposition, exposition_of
-from eomgen.derivation.matrices import Matrices, written_out, written_size
+from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.own_names import names_within
 from eomgen.derivation.reading import read, read_all, reading_names

@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import sympy as sp
 
+from eomgen.derivation.definitions import written_out
 from eomgen.derivation.identity import identical
 from eomgen.derivation.linkage import Frame, Linkage, linkage_of
-from eomgen.derivation.matrices import Matrices, written_out
+from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import short_name
 from eomgen.derivation.rotations import rate

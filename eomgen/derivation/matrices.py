@@ -1,19 +1,15 @@
 """The derived equations as SymPy matrices over the names of a scene."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from eomgen.derivation.definitions import is_turn, written_out
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.handout.solution import Definition
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.state_forms import needed_by
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula, written
-
-ROTATIONS = ("R__", "k__")
-"""How names of entries of a joint's rotation begin."""
 
 
 @dataclass(frozen=True)
@@ -35,26 +31,6 @@ class Matrices:
     F: Expr
     definitions: tuple[Definition, ...]
     formulas: dict[Expr, str]
-
-
-def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
-    """An expression with all definitions substituted. For a long solution it is very long."""
-    known: dict[Expr, Expr] = {}
-    for symbol, value in needed_by([expression], tuple(definitions)):
-        known[symbol] = value.xreplace(known)
-    return expression.xreplace(known)
-
-
-def written_size(expression: Expr, definitions: Iterable[Definition]) -> int:
-    """The symbols and numbers that an expression has with all definitions substituted."""
-    counts: dict[Expr, int] = {}
-
-    def leaves(e: Expr) -> int:
-        return sum(counts.get(x, 1) for x in sp.preorder_traversal(e) if x.is_Atom)
-
-    for symbol, value in needed_by([expression], tuple(definitions)):
-        counts[symbol] = leaves(value)
-    return leaves(expression)
 
 
 def of_pins(equations: Equations) -> Matrices:
@@ -89,11 +65,7 @@ def of_projected(equations: ProjectedEquations) -> Matrices:
     """The matrices of the derivation by projected constraints, over entries of rotations."""
     s, found = equations.symbols, equations.balance
     definitions = projected_definitions(equations)
-    motion = [
-        pair
-        for pair in definitions[: equations.motion_definitions]
-        if not pair[0].name.startswith(ROTATIONS)
-    ]
+    motion = [pair for pair in definitions[: equations.motion_definitions] if not is_turn(pair[0])]
     given = _given(equations)
     M, V, G, F = (
         written_out(m.xreplace(given), motion) for m in (found.M, found.V, found.G, found.F)
@@ -103,7 +75,7 @@ def of_projected(equations: ProjectedEquations) -> Matrices:
 
 def over_coordinates(found: Matrices) -> Matrices:
     """The same over coordinates: entries of rotations by what they stand for."""
-    turns = [pair for pair in found.definitions if pair[0].name.startswith(ROTATIONS)]
+    turns = [pair for pair in found.definitions if is_turn(pair[0])]
     letters = {x: written_out(getattr(found, x), turns) for x in "MVGF"}
     return replace(found, **letters)
 

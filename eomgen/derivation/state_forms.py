@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.definitions import needed_by
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.handout.closed import Equations
@@ -76,19 +77,6 @@ def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
         if inner == expression:
             return inner
         expression = inner
-
-
-def needed_by(
-    expressions: Sequence[Expr], definitions: Sequence[tuple[Expr, Expr]]
-) -> tuple[tuple[Expr, Expr], ...]:
-    """The definitions that expressions need, directly or by others."""
-    needed = {s for e in expressions for s in e.free_symbols}
-    kept = []
-    for symbol, e in reversed(definitions):
-        if symbol in needed:
-            needed |= e.free_symbols
-            kept.append((symbol, e))
-    return tuple(reversed(kept))
 
 
 def form_step(

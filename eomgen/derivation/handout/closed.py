@@ -15,9 +15,10 @@ from eomgen.derivation.handout.elimination import (
 )
 from eomgen.derivation.handout.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.handout.kinematics import Kinematics, differentiate_joints
-from eomgen.derivation.handout.solution import Definition, Solution, solve
+from eomgen.derivation.handout.solution import Solution, solve
 from eomgen.derivation.handout.symbols import BodySymbols, body_symbols
 from eomgen.derivation.rewriting import by_variables, tidy
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import is_zero

@@ -21,11 +21,9 @@ from eomgen.derivation.handout.elimination import Tree, trees
 from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.handout.symbols import BodySymbols, Vec, add, scale
 from eomgen.derivation.rewriting import by_variables, is_sum_of_positive_terms, tidy
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
-
-Definition = tuple[Expr, Expr]
-"""A symbol and its definition over symbols that are defined before it."""
 
 
 @dataclass(frozen=True)

@@ -274,11 +274,6 @@ def readable(equations: Equations) -> dict[Expr, Expr]:
         shown[symbol] = sp.Symbol(written(formula))
     short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j",
              "effort": "tau"}  # fmt: skip
-    for body in model.bodies:
-        for field, letter in (("mass", "m"), ("inertia_com", "I")):
-            named = s.parameters.get(f"{body.name}_{field}")
-            if named is not None and f"{letter}_{body.name}" not in taken:
-                shown[named] = sp.Symbol(f"{letter}_{body.name}")
     for symbol in (*equations.free_bodies.efforts, *dict(equations.solution.definitions)):
         kind, _, rest = symbol.name.partition("__")
         if symbol not in shown and kind in short:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.definitions import Ledger, triple
 from eomgen.derivation.linkage import Frame, Linkage
-from eomgen.derivation.projected.ledger import Ledger, triple
 from eomgen.derivation.rotations import hat, quaternion_rates, rate
 from eomgen.derivation.symbols import Expr, Symbols, real
 

@@ -5,9 +5,9 @@ method).
 from dataclasses import dataclass, replace
 
 from eomgen.base.errors import SceneError
+from eomgen.derivation.definitions import Ledger
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.equations import Balance, Motion, balance, body_motions
-from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.projected.loads import Loads, loads_of
 from eomgen.derivation.projected.solution import Solution, solve
 from eomgen.derivation.projected.tree import Tree

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.projected.ledger import Ledger
+from eomgen.derivation.definitions import TURNS, Ledger
 from eomgen.derivation.projected.loads import BodyLoad, Loads
 from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.rewriting import gathered
 from eomgen.derivation.symbols import Expr
 
-ROTATIONS = ("R__", "k__", "W__")
+ROTATIONS = (*TURNS, "W__")
 """Prefixes of names of rotation entries, which are not substituted."""
 SLACK = 1.5
 """How many times as long as the shortest form the entries of M, V, G, F may be."""

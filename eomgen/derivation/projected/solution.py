@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from eomgen.derivation.definitions import Ledger
 from eomgen.derivation.linkage import Frame
 from eomgen.derivation.projected.equations import Motion, generalised
-from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.projected.loads import Loads
 from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.rewriting import is_sum_of_positive_terms, nested, sum_of_squares

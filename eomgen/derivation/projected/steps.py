@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
+from eomgen.derivation.definitions import is_turn, needed_by
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.reading import brief_coordinates, words_on_names
+from eomgen.derivation.reading import brief_coordinates, short_name, words_on_names
 from eomgen.derivation.rewriting import gathered
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
@@ -30,8 +31,6 @@ PARTS_ARE = (
     "a^0 are the accelerations that remain while all derivatives of velocities are 0. g is the "
     "acceleration of gravity, and W rotates axes of a body into the world's."
 )
-ROTATIONS = ("R__", "k__")
-"""How names of entries of rotations begin, which are shown with their joint."""
 
 
 def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
@@ -85,14 +84,13 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
             (sp.Symbol(dotted("v")), sp.Matrix([s.a])),
         ],
     )
-    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
-    still = still_symbols(equations)
+    definitions, still = _motion(equations), still_symbols(equations)
     for body, c in zip(model.bodies, equations.constraints, strict=True):
         parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
         own = [(symbol, e) for symbol, e in definitions if symbol.name.split("__")[1] == body.name]
         whole = c.axes * c.rotation
         position = c.axes * c.reach - whole * c.arm
-        pairs: Pairs = [(symbol, e) for symbol, e in own if symbol.name.startswith(ROTATIONS)]
+        pairs: Pairs = [(symbol, e) for symbol, e in own if is_turn(symbol)]
         size = 2 if plane else 3
         if whole != sp.eye(3):
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
@@ -206,29 +204,26 @@ def _balance(equations: ProjectedEquations, before: Sequence[Titled]) -> Iterato
     yield "equations", "Applied forces", "", [(sp.Symbol("F"), terms.F)]
 
 
-def named_parts(equations: ProjectedEquations, expressions: list[Expr]) -> Pairs:
+def named_parts(equations: ProjectedEquations, expressions: Sequence[Expr]) -> Pairs:
     """The parts of the motion that expressions need, by their names."""
-    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
-    needed = _needed(equations, expressions)
-    return [
-        (symbol, e)
-        for symbol, e in definitions
-        if symbol in needed and not symbol.name.startswith(ROTATIONS)
-    ]
+    parts = needed_by(expressions, _motion(equations))
+    return [pair for pair in parts if not is_turn(pair[0])]
+
+
+def _motion(equations: ProjectedEquations) -> Pairs:
+    """The definitions of the motion."""
+    return [*equations.solution.definitions.items()][: equations.motion_definitions]
 
 
 def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
     """The closed form without the generalised forces, which only `forward_dynamics` has."""
-    s, definitions = equations.symbols, equations.solution.definitions
+    s, terms = equations.symbols, equations.balance
     still = dict.fromkeys(s.tau, sp.Integer(0))
-    needed = _needed(equations, s.a, still)
-    reported = {*[*definitions][: equations.motion_definitions]}
-    known = _needed(equations, [e for m in (equations.balance.M, equations.balance.V) for e in m])
-    pairs = []
-    for symbol, e in definitions.items():
-        before = symbol.name.startswith(ROTATIONS) or (symbol in reported and symbol in known)
-        if symbol in needed and not before:
-            pairs.append((symbol, _flat(e.xreplace(still), s.fixed)))
+    every = [(x, e.xreplace(still)) for x, e in equations.solution.definitions.items()]
+    said = {x for x, _ in named_parts(equations, [terms.M, terms.V])}
+    pairs = [
+        (x, _flat(e, s.fixed)) for x, e in needed_by(s.a, every) if not is_turn(x) and x not in said
+    ]
     yield (
         "solution",
         "Closed form",
@@ -243,22 +238,6 @@ def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
     )
 
 
-def _needed(
-    equations: ProjectedEquations,
-    expressions: list[Expr] | tuple[Expr, ...],
-    still: dict[Expr, Expr] | None = None,
-) -> set[Expr]:
-    """The defined symbols that expressions need, directly or by others."""
-    definitions, needed = equations.solution.definitions, set[Expr]()
-    stack = [symbol for e in expressions for symbol in e.free_symbols]
-    while stack:
-        symbol = stack.pop()
-        if symbol in definitions and symbol not in needed:
-            needed.add(symbol)
-            stack += definitions[symbol].xreplace(still or {}).free_symbols
-    return needed
-
-
 KINDS = {
     "omega": "omega", "alpha": "alpha", "a": "a", "u": "u", "g": "g", "R": "R", "k": "k", "W": "W",
     "turn": "omega", "move": "u", "pivot": "d", "coupling": "c", "bias": "beta", "rest": "b",
@@ -271,47 +250,21 @@ KINDS = {
 def readable_symbols(equations: ProjectedEquations) -> dict[Expr, Expr]:
     """Symbols by ones whose names that printers know how to write."""
     s, model = equations.symbols, equations.model
-    taken = {*s.parameters, *s.inputs}
-    shown: dict[Expr, Expr] = {}
-    words: dict[str, str] = {}
-
-    def show(symbol: Expr, name: str) -> None:
-        while name in taken:
-            name = f"{name},own"
-        taken.add(name)
-        shown[symbol] = sp.Symbol(name)
-
-    quaternions = {i: "wxyz"[n] for four in model.quaternions for n, i in enumerate(four)}
-    for i, q in enumerate(s.q):
-        if i in quaternions:
-            show(q, f"q_{q.name.rpartition('_')[0]},{quaternions[i]}")
-        else:
-            taken.add(q.name)
-    single = {
-        first: body.name
-        for body, first in zip(model.bodies, model.first_velocity, strict=True)
-        if len(body.velocities) == 1
-    }
-    short = {c: name.partition("_")[2] for c, name in brief_coordinates(model).items()}
-    for i, (v, a) in enumerate(zip(s.v, s.a, strict=True)):
-        name = v.name.removesuffix("_dot")
-        words[v.name] = single.get(i) or short.get(name, name)
-        if name != v.name:
-            show(v, dotted(name))
-            show(a, dotted(name, 2))
-        else:
-            prefix, _, axis = name.rpartition("_w")
-            words[v.name] = f"{prefix},{axis}"
-            show(v, f"omega_{prefix},{axis}")
-            show(a, dotted(f"omega_{prefix},{axis}"))
-    for formula, symbol in s.formulas.items():
-        shown[symbol] = sp.Symbol(written(formula))
+    taken = {*s.parameters, *s.inputs, *(q.name for q in s.q)}
+    shown = {symbol: sp.Symbol(written(formula)) for formula, symbol in s.formulas.items()}
     for c in equations.constraints:  # a body that turns freely in the world
-        for symbol, e in zip(c.own.omega, c.omega, strict=True):
-            if e in shown:
-                shown[symbol] = shown[e]
-    moving = [x for c in equations.constraints for m in (c.own,) for vector in
-              (m.omega, m.velocity, m.alpha, m.acceleration) for x in vector]  # fmt: skip
+        turning = zip(c.own.omega, c.omega, strict=True)
+        shown |= {symbol: e for symbol, e in turning if e in s.v}
+    words: dict[str, str] = {}
+    short = {c: name.partition("_")[2] for c, name in brief_coordinates(model).items()}
+    for index in model.joint_indices:
+        for j in index.v:
+            velocity = s.v[j].name
+            name = velocity.removesuffix("_dot")
+            word = index.body.name if len(index.v) == 1 else short.get(name, name)
+            words[velocity] = word if name != velocity else short_name(velocity)
+    own = (c.own for c in equations.constraints)
+    moving = [x for m in own for vector in vars(m).values() for x in vector]
     for symbol in (*moving, *equations.solution.definitions):
         kind, _, rest = symbol.name.partition("__")
         if symbol in shown or kind not in KINDS:
@@ -319,5 +272,9 @@ def readable_symbols(equations: ProjectedEquations) -> dict[Expr, Expr]:
         parts = [words.get(part, part) for part in rest.split("__")]
         if kind in ("turn", "move", "mean", "apart"):  # the body first, then the velocity
             parts = [*parts[1:], parts[0]]
-        show(symbol, f"{KINDS[kind]}_{','.join(parts)}")
+        name = f"{KINDS[kind]}_{','.join(parts)}"
+        while name in taken:
+            name = f"{name},own"
+        taken.add(name)
+        shown[symbol] = sp.Symbol(name)
     return shown

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from eomgen.derivation.definitions import Ledger
 from eomgen.derivation.linkage import Frame, Linkage, linkage_of
 from eomgen.derivation.projected.constraints import Constraint, state_joints
-from eomgen.derivation.projected.ledger import Ledger
 from eomgen.derivation.rotations import about
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols
 from eomgen.model.model import Model

@@ -1,12 +1,54 @@
-"""The definitions that a derivation makes, in order."""
+"""The definitions that a derivation makes, in order, and what is written with them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
 
 from eomgen.derivation.rewriting import gathered
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr, real
+
+TURNS = ("R__", "k__")
+"""How the names of entries of a joint's rotation begin."""
+
+
+def is_turn(symbol: Expr) -> bool:
+    """Whether a symbol is an entry of a joint's rotation, or scales a quaternion."""
+    return bool(symbol.name.startswith(TURNS))
+
+
+def needed_by(
+    expressions: Sequence[Expr], definitions: Sequence[Definition]
+) -> tuple[Definition, ...]:
+    """The definitions that expressions need, directly or by others."""
+    needed = {s for e in expressions for s in e.free_symbols}
+    kept = []
+    for symbol, e in reversed(definitions):
+        if symbol in needed:
+            needed |= e.free_symbols
+            kept.append((symbol, e))
+    return tuple(reversed(kept))
+
+
+def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
+    """An expression with all definitions substituted. For a long solution it is very long."""
+    known: dict[Expr, Expr] = {}
+    for symbol, value in needed_by([expression], tuple(definitions)):
+        known[symbol] = value.xreplace(known)
+    return expression.xreplace(known)
+
+
+def written_size(expression: Expr, definitions: Iterable[Definition]) -> int:
+    """The symbols and numbers that an expression has with all definitions substituted."""
+    counts: dict[Expr, int] = {}
+
+    def leaves(e: Expr) -> int:
+        return sum(counts.get(x, 1) for x in sp.preorder_traversal(e) if x.is_Atom)
+
+    for symbol, value in needed_by([expression], tuple(definitions)):
+        counts[symbol] = leaves(value)
+    return leaves(expression)
 
 
 def triple(word: str, name: str) -> Expr:
