@@ -183,15 +183,15 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     if direct is None:
         equations = solved_pins(equations)
     equations = replace(equations, collected=_each(equations.collected, tidied))
-    shown = readable(equations)
-    names = _names(model, shown)
+    names = names_within(model)
+    names |= {own: names.get(name, name) for own, name in readable(equations).items()}
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
     steps = [_renamed(step, names) for step in handout_steps(equations)]
     place = _first(steps, "solution")
     whole = _whole(of_pins(equations), model, parts)
     if direct is not None:
-        read = {x.xreplace(shown): e.xreplace(shown) for x, e in zip(s.a, direct, strict=True)}
-        steps[place] = _renamed(_directly(steps[place], read), names)
+        lines = dict(zip(s.a, direct, strict=True))
+        steps[place] = _renamed(_directly(steps[place], lines), names)
         whole = _with(whole, direct)
     last = _last(model, parts)
     if form != "velocity":
@@ -383,12 +383,6 @@ def _free_words(model: Model) -> str:
         "forces of its effects, and in the other directions they do no work."
     )
     return words + (" " + PRESCRIBED if model.prescribed else "")
-
-
-def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:
-    names = names_within(model)
-    own = {x.name: names.get(other.name, other.name) for x, other in shown.items()}
-    return {**names, **own}
 
 
 def _renamed(step: Step, names: dict[str, str]) -> Step:

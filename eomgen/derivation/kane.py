@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import sympy as sp
 
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.projected.steps import read_pairs, still_symbols
+from eomgen.derivation.projected.steps import read_step, still_symbols
 from eomgen.derivation.reading import short_name
 from eomgen.derivation.steps import Pairs, Step
 from eomgen.derivation.symbols import Expr
@@ -43,8 +43,9 @@ def kane_written(equations: ProjectedEquations) -> Iterator[Step]:
                 shown = along[planar, :] if plane else along
                 value: Expr = shown[0] if len(shown) == 1 else shown
                 partial.append((sp.Symbol(f"{letter}_{body.name},{words[j]}"), value))
-    yield Step(
-        "balance", "Partial velocities", PARTIAL, read_pairs(equations, partial, moving=True)
-    )
     lines = [(sp.Symbol(f"Z_{word}"), x) for word, x in zip(words, power, strict=True)]
-    yield Step("balance", "The power of inertia", POWER, read_pairs(equations, lines, moving=True))
+    for title, about, pairs in (
+        ("Partial velocities", PARTIAL, partial),
+        ("The power of inertia", POWER, lines),
+    ):
+        yield read_step(equations, Step.of("balance", title, about, pairs), moving=True)

@@ -20,7 +20,7 @@ from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import short_name
 from eomgen.derivation.rotations import rate
 from eomgen.derivation.simplified import simplified, size
-from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.steps import Equation, Step, terms_steps
 from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 
@@ -76,10 +76,7 @@ def lagrange_written(
     steps = [Step("balance", "Energies", ENERGIES, tuple(energies))] if energies else []
     steps += _derivatives(model, momenta, along)
     words = EQUATIONS + (HAMEL if any(_spins(model)) else "")
-    steps.append(Step("equations", "Lagrange's equations", words, (_line("M", tree.M),)))
-    for letter, title in (("V", "Velocity"), ("G", "Gravity"), ("F", "Applied")):
-        lines = (_line(letter, getattr(tree, letter)),)
-        steps.append(Step("equations", f"{title} forces", "", lines))
+    steps += terms_steps("Lagrange's equations", words, tree)
     return steps
 
 
@@ -93,10 +90,6 @@ def _derivatives(model: Model, momenta: Expr, along: Expr) -> Iterator[Step]:
                 lines.append(Equation(real(f"{letter}_{word}"), short))
     if lines:
         yield Step("balance", "The derivatives of the kinetic energy", DERIVATIVES, tuple(lines))
-
-
-def _line(letter: str, e: Expr) -> Equation:
-    return Equation(sp.Symbol(letter), e)
 
 
 def _energies(kinetic: Expr, potential: Expr) -> Iterator[tuple[str, Expr]]:

@@ -9,7 +9,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import equations_of
 from eomgen.derivation.embedding import Embedding, Polygon, projected, solved_for
 from eomgen.derivation.matrices import Matrices
-from eomgen.derivation.simplified import simplified, size
+from eomgen.derivation.simplified import by_cramer, simplified, size
 from eomgen.derivation.steps import Definition, Equation, Step
 from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.start.walks import safely_dependent
@@ -214,19 +214,13 @@ def _multiplier_lines(found: Embedding) -> list[Equation]:
         block = sp.Matrix(
             [[dict(row.slopes).get(names[j], sp.S.Zero) for row in polygon.rows] for j in own]
         )
-        values = [left[0] / block[0, 0]] if block.rows == 1 else _solved(block, left)
-        for row, value in zip(polygon.rows, values, strict=True):
-            lines.append(Equation(row.multiplier, simplified(value)))
+        tops, whole = by_cramer(block, left)
+        for row, top in zip(polygon.rows, tops, strict=True):
+            lines.append(Equation(row.multiplier, simplified(top / whole)))
             for name, slope in row.slopes:
                 j = names.index(name)
                 pulled[j] = pulled.get(j, sp.S.Zero) + slope * row.multiplier
     return lines
-
-
-def _solved(block: Expr, right: Sequence[Expr]) -> list[Expr]:
-    (a, b), (c, d) = block.tolist()
-    whole = simplified(a * d - b * c)
-    return [(d * right[0] - b * right[1]) / whole, (a * right[1] - c * right[0]) / whole]
 
 
 def freedom_algorithm(found: Embedding, constraints: Sequence[DerivedConstraint]) -> Iterator[Step]:

@@ -20,11 +20,11 @@ from eomgen.derivation.projected.steps import (
     PARTS,
     PARTS_ARE,
     named_parts,
-    read_pairs,
+    read_step,
     still_symbols,
 )
 from eomgen.derivation.rotations import rate
-from eomgen.derivation.steps import Pairs, Step
+from eomgen.derivation.steps import Pairs, Step, terms_steps
 from eomgen.derivation.symbols import Expr, real
 
 MOST = 1200
@@ -189,8 +189,8 @@ def _check(equations: ProjectedEquations, found: JointForces) -> None:
 
 def _steps(equations: ProjectedEquations, found: JointForces) -> Iterator[Step]:
     def step(title: str, words: str, pairs: Pairs) -> Step:
-        moving = title != PARTS
-        return Step("balance", title, words, read_pairs(equations, pairs, moving=moving))
+        told = Step.of("balance", title, words, pairs)
+        return read_step(equations, told, moving=title != PARTS)
 
     terms = equations.balance
     own = dict.fromkeys(_accelerations(equations), sp.S.Zero)
@@ -201,12 +201,5 @@ def _steps(equations: ProjectedEquations, found: JointForces) -> Iterator[Step]:
     if found.forces:
         yield step("The joints' forces, from the last body to the first", FORCES, found.forces)
         yield step("Along the joints' own motions", ROWS, found.rows)
-    for title, letter in (
-        ("Collected", "M"),
-        ("Velocity forces", "V"),
-        ("Gravity forces", "G"),
-        ("Applied forces", "F"),
-    ):
-        words = COLLECTED if letter == "M" else ""
-        lines = read_pairs(equations, [(sp.Symbol(letter), getattr(terms, letter))])
-        yield Step("equations", title, words, lines)
+    for told in terms_steps("Collected", COLLECTED, terms):
+        yield read_step(equations, told)

@@ -16,6 +16,7 @@ import sympy as sp
 
 from eomgen.derivation.composite import outward_step
 from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.lagrange import HAMEL
 from eomgen.derivation.linkage import Frame, Linkage
 from eomgen.derivation.recursion import (
     FRAMES,
@@ -64,10 +65,6 @@ ENERGY = (
     "d/dt ∂T/∂v - ∂T/∂q where dv/dt = 0, G is ∂U/∂q with the potential energy U of gravity, and F "
     "is the power of the loads f and of the joints' own loads at unit velocity. γ is the "
     "acceleration of gravity in axes of a frame. The equations are M dv/dt + h_0 = 0."
-)
-HAMEL = (
-    " The components of a ball's ω are not derivatives of coordinates: ∂/∂q is the derivative "
-    "along a rotation about an axis of the body, and V has ω × ∂T/∂ω beside the rest."
 )
 
 

@@ -1,6 +1,7 @@
 """Expressions simplified by inexpensive rewriting, in normal forms in which equal terms cancel."""
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import sympy as sp
 
@@ -57,21 +58,24 @@ def _product(part: Expr, wave: Expr) -> Expr:
     return k / 2 * pair
 
 
-def canonical(expression: Expr) -> Expr:
-    """The expanded form with cos² written as 1 - sin², so that terms which are equal cancel."""
+def canonical(expression: Expr, even: Any = sp.cos) -> Expr:
+    """The expanded form with cos² written as 1 - sin², so that terms which are equal cancel; with
+    sin for `even` the reverse.
+    """
     expanded = sp.expand(expression)
-    if not any(p.base.func is sp.cos and p.exp.is_Integer for p in expanded.atoms(sp.Pow)):
+    if not any(p.base.func is even and p.exp.is_Integer for p in expanded.atoms(sp.Pow)):
         return expanded
-    return sp.expand(sp.Add(*(_no_even_cosines(t) for t in sp.Add.make_args(expanded))))
+    return sp.expand(sp.Add(*(_without(t, even) for t in sp.Add.make_args(expanded))))
 
 
-def _no_even_cosines(term: Expr) -> Expr:
-    factors = []
+def _without(term: Expr, even: Any) -> Expr:
+    """A term without even powers of cos, or of sin."""
+    other, factors = sp.sin if even is sp.cos else sp.cos, []
     for factor in sp.Mul.make_args(term):
         base, power = factor.as_base_exp()
-        if isinstance(base, sp.cos) and power.is_Integer and power > 1:
+        if isinstance(base, even) and power.is_Integer and power > 1:
             half, odd = divmod(int(power), 2)
-            factors += [(1 - sp.sin(base.args[0]) ** 2) ** half, base**odd]
+            factors += [(1 - other(base.args[0]) ** 2) ** half, base**odd]
         else:
             factors.append(factor)
     return sp.Mul(*factors)

@@ -99,13 +99,20 @@ def solved_directly(M: Expr, right: Expr) -> list[Expr] | None:
             sides = [right[i] for i in coupled]
             if sum(map(size, (*block, *sides))) > MOST_SOLVED:
                 return None
-            (a, b), (c, d) = block.tolist()
-            p, q = sides
-            whole = simplified(a * d - b * c)
-            tops = [simplified(d * p - b * q), simplified(a * q - c * p)]
+            tops, whole = by_cramer(block, sides)
+            tops = [simplified(top) for top in tops]
             pairs = [min((top / whole, simplified(top / whole)), key=size) for top in tops]
             found[coupled[0]], found[coupled[1]] = pairs
     return found if sum(map(size, found)) <= MOST_SOLVED else None
+
+
+def by_cramer(block: Expr, sides: Sequence[Expr]) -> tuple[list[Expr], Expr]:
+    """The solution of one or two equations: numerators, and the determinant below them."""
+    if block.rows == 1:
+        return [sides[0]], block[0, 0]
+    (a, b), (c, d) = block.tolist()
+    p, q = sides
+    return [d * p - b * q, a * q - c * p], simplified(a * d - b * c)
 
 
 def size(e: Expr) -> int:
@@ -181,7 +188,7 @@ def _flat(e: Expr) -> Iterator[Expr]:
     short = canonical(flat)
     yield from _with_cosines(short)
     yield short
-    yield _no_even_sines(flat)
+    yield canonical(flat, sp.sin)
     yield tidy(flat)
 
 
@@ -196,20 +203,6 @@ def _with_cosines(flat: Expr) -> Iterator[Expr]:
         yield (
             _factored(sp.expand(still + slope)) * wave**2 + _factored(still) * sp.cos(*angles) ** 2
         )
-
-
-def _no_even_sines(flat: Expr) -> Expr:
-    """sin² as 1 - cos²."""
-
-    def changed(power: Expr) -> bool:
-        return isinstance(power.base, sp.sin) and power.exp.is_Integer and power.exp > 1
-
-    return sp.expand(
-        flat.replace(
-            lambda x: isinstance(x, sp.Pow) and changed(x),
-            lambda x: (1 - sp.cos(x.base.args[0]) ** 2) ** (x.exp // 2) * x.base ** (x.exp % 2),
-        )
-    )
 
 
 def _collected(flat: Expr) -> Iterator[Expr]:

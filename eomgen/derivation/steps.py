@@ -1,14 +1,17 @@
 """What a derivation that is to be read consists of."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+import sympy as sp
 
 from eomgen.derivation.symbols import Expr
 from eomgen.tables.details import Detail, Method
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
-Pairs = list[tuple[Expr, Expr]]
+Pairs = list[Definition]
 """Left and right sides of equations."""
 Kind = Literal["introduction", "state", "bodies", "balance", "joint", "motion", "pose", "effect",
                "constraint", "algorithm", "equations", "solution", "form", "impact", "force",
@@ -60,7 +63,21 @@ class Step:
     number: str = ""
     way: Method | None = None
 
+    @classmethod
+    def of(
+        cls, kind: Kind, title: str, words: str, pairs: Iterable[Definition], number: str = ""
+    ) -> "Step":
+        """A step with lines by their left and right sides."""
+        return cls(kind, title, words, tuple(Equation(*pair) for pair in pairs), number)
+
     @property
     def figure(self) -> str:
         """The sketch that belongs beside the words: "mechanism", "bodies", or none."""
         return FIGURES.get(self.kind, "")
+
+
+def terms_steps(title: str, words: str, terms: Any) -> Iterator[Step]:
+    """M, V, G and F of M v̇ + V + G = F, a step each; that of M has its own title and words."""
+    whole = (("M", title, words), ("V", "Velocity forces", ""), ("G", "Gravity forces", ""))
+    for letter, name, about in (*whole, ("F", "Applied forces", "")):
+        yield Step.of("equations", name, about, [(sp.Symbol(letter), getattr(terms, letter))])

@@ -8,48 +8,29 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.elimination import rows_without_forces, symmetric, trees
 from eomgen.derivation.reading import words_on_names
-from eomgen.derivation.steps import Equation, Kind, Pairs, Step
+from eomgen.derivation.steps import Equation, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 
 
-def handout_steps(equations: Equations) -> tuple[Step, ...]:
-    """Every step from the state to the closed form, in symbols meant for reading."""
-    shown = readable(equations)
-    return tuple(
-        Step(
-            kind,
-            title,
-            words,
-            tuple(
-                Equation(left.xreplace(shown), right.xreplace(shown))
-                for left, right in pairs
-                if left.xreplace(shown) != right.xreplace(shown)
-            ),
-            number,
-        )
-        for number, kind, title, words, pairs in (
-            *_mechanism(equations),
-            *_equations_of_motion(equations),
-            *_solution(equations),
-        )
-    )
+def handout_steps(equations: Equations) -> Iterator[Step]:
+    """Every step from the state to the closed form, in the derivation's own symbols."""
+    yield from _mechanism(equations)
+    yield from _equations_of_motion(equations)
+    yield from _solution(equations)
 
 
 NOT_SYMMETRIC = (
     "Not symmetric: its rows are torques about the bodies' own centres. `mass_matrix()` of the "
     "generated module is the symmetric one."
 )
-Titled = tuple[str, Kind, str, str, Pairs]
-"""Number, kind, title, words and lines of a step, these in the derivation's own symbols."""
 
 
-def _mechanism(equations: Equations) -> Iterator[Titled]:
+def _mechanism(equations: Equations) -> Iterator[Step]:
     """State, free bodies, and the joints as constraints."""
     s, kin, model = equations.symbols, equations.kinematics, equations.model
     held = [k for k, body in enumerate(model.bodies) if body.joint.holds]
-    yield (
-        "(1)",
+    yield Step.of(
         "state",
         "State",
         "Each body has the position x, y of its centre of mass, its momentum P = m v, its "
@@ -60,46 +41,53 @@ def _mechanism(equations: Equations) -> Iterator[Titled]:
             *zip(s.angle, kin.angle, strict=True),
             *zip(s.omega, kin.omega, strict=True),
         ],
+        "(1)",
     )
-    yield (
-        "(2)-(11)",
+    yield Step.of(
         "bodies",
         "Momenta and forces",
         "Force is dP/dt, torque is dL/dt. The joint force f_j acts on the parent, -f_j on the "
         "child; both are unknown. The forces of effects, (29) to (35), are among them.",
         [pair for k in range(len(model.bodies)) for pair in _momenta(equations, k)],
+        "(2)-(11)",
     )
-    yield (
-        "(12)-(17)",
+    yield Step.of(
         "balance",
         "Free bodies",
         f"The same for the accelerations: {_count(3 * len(model.bodies))} scalar equations in "
         f"{_count(3 * len(model.bodies) + 2 * len(held))} unknowns, the accelerations and the "
         "joint forces. What the joints say of the accelerations is missing.",
         list(equations.free_bodies.equations),
+        "(12)-(17)",
     )
-    yield (
-        "(18), (19)",
-        "joint",
-        "Arms",
-        "From each centre of mass to the joint, in world axes.",
-        [pair for k in held for pair in _arms(equations, k)],
+    arms = []
+    for k in held:
+        name = model.bodies[k].joint.name
+        for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
+            for axis, component in zip("xy", arm, strict=True):
+                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
+    yield Step.of(
+        "joint", "Arms", "From each centre of mass to the joint, in world axes.", arms, "(18), (19)"
     )
-    yield (
-        "(20), (21)",
+    yield Step.of(
         "joint",
         "Constraint",
         "The two bodies share the joint: x_parent + r_parent = x_child + r_child. This gives the "
         "place of the child.",
         [pair for k in held for pair in (*_shared(equations, k), *_placed(equations, k))],
+        "(20), (21)",
     )
-    yield (
-        "(22), (23)",
+    yield Step.of(
         "joint",
         "Constraint differentiated twice",
         "The child's acceleration, from the parent's and from the angular velocities and "
         "accelerations.",
-        [pair for k in held for pair in _accelerated(equations, k)],
+        [
+            pair
+            for k in held
+            for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
+        ],
+        "(22), (23)",
     )
 
 
@@ -161,35 +149,31 @@ def _redundant_state(equations: Equations) -> Expr:
     return sp.Matrix([row])
 
 
-def _equations_of_motion(equations: Equations) -> Iterator[Titled]:
+def _equations_of_motion(equations: Equations) -> Iterator[Step]:
     """The joint forces eliminated, and M, V, G, F."""
     floating = any(tree.floating for tree in trees(equations.model))
     yield from _eliminated(equations)
     sums = ", a floating tree's first rows being the sum of its forces." if floating else "."
-    yield (
-        "(24), (25)",
+    yield Step.of(
         "equations",
         "Elimination",
         "In matrices this is M a + V + G = F in the accelerations a of the coordinates" + sums,
         [_system(equations), (sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
+        "(24), (25)",
     )
     collected = equations.collected
     rows = "" if collected.M == collected.M.T else NOT_SYMMETRIC
-    yield "(26)", "equations", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)]
-    yield "(27)", "equations", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
-    yield "(28)", "equations", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
+    yield Step.of("equations", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)], "(26)")
+    yield Step.of("equations", "Velocity forces", "", [(sp.Symbol("V"), collected.V)], "(27)")
+    yield Step.of("equations", "Gravity forces", "", [(sp.Symbol("G"), collected.G)], "(28)")
     words = "External forces and joint torques, eliminated in the same way."
     efforts = equations.free_bodies.efforts.items()
-    yield (
-        "(29)-(36)",
-        "equations",
-        "Applied forces",
-        words,
-        [(sp.Symbol("F"), collected.F), *efforts],
+    yield Step.of(
+        "equations", "Applied forces", words, [(sp.Symbol("F"), collected.F), *efforts], "(29)-(36)"
     )
 
 
-def _eliminated(equations: Equations) -> Iterator[Titled]:
+def _eliminated(equations: Equations) -> Iterator[Step]:
     """The elimination line by line: joint forces, then dependent accelerations."""
     model, s, kin = equations.model, equations.symbols, equations.kinematics
     force = "f_j accelerates the bodies on the inner side of its joint"
@@ -197,23 +181,21 @@ def _eliminated(equations: Equations) -> Iterator[Titled]:
         force = "-f_j accelerates the bodies on the outer side of its joint"
     if not equations.joint_force:
         return
-    yield "", "balance", "The joint forces", f"{force}.", list(equations.joint_force)
+    yield Step.of("balance", "The joint forces", f"{force}.", list(equations.joint_force))
     left = rows_without_forces(kin, kin.inertial)
     free = equations.free_bodies
     pairs = zip(
         rows_without_forces(kin, free.gravity), rows_without_forces(kin, free.applied), strict=True
     )
     right = [sum(pair) for pair in pairs]
-    yield (
-        "",
+    yield Step.of(
         "balance",
         "Without joint forces",
         "Put into the equations of the other bodies and into the torque equations.",
         list(zip(left, right, strict=True)),
     )
     a, whole = sp.Matrix(s.a), equations.collected
-    yield (
-        "",
+    yield Step.of(
         "balance",
         "Without dependent accelerations",
         "With (22) and (23), collected by the accelerations of the coordinates.",
@@ -228,19 +210,19 @@ def _system(equations: Equations) -> tuple[Expr, Expr]:
     return sp.MatAdd(sp.MatMul(M, a), V, G), F
 
 
-def _solution(equations: Equations) -> Iterator[Titled]:
+def _solution(equations: Equations) -> Iterator[Step]:
     """The closed form; its numbers continue the handout's."""
-    yield (
-        "(37)",
+    yield Step.of(
         "solution",
         "Closed form",
         "Solved once, symbolically, for the angular acceleration α of every body. The pivots d "
         "are sums of positive terms, so no division can fail at any pose; c couples one body to "
         "another, b is its load, and M the mass of a whole tree.",
         _solved(equations),
+        "(37)",
     )
     words = "Recovered from the accelerations."
-    yield "(38)", "force", "Joint force", words, list(equations.joint_force)
+    yield Step.of("force", "Joint force", words, list(equations.joint_force), "(38)")
 
 
 def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
@@ -252,34 +234,27 @@ def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
     ]
 
 
-def readable(equations: Equations) -> dict[Expr, Expr]:
-    """Symbols by ones whose names that printers know how to write."""
+def readable(equations: Equations) -> dict[str, str]:
+    """Names of symbols by ones that printers know how to write."""
     s, model = equations.symbols, equations.model
-    names = [body.name for body in model.bodies]
-    shown: dict[Expr, Expr] = {}
     taken = {*s.parameters, *s.inputs, *(q.name for q in s.q)}
-    for q, v, a in zip(s.q, s.v, s.a, strict=True):
-        shown[v], shown[a] = sp.Symbol(dotted(q.name)), sp.Symbol(dotted(q.name, 2))
-    words = (
-        ("x", s.x), ("y", s.y), ("psi", s.angle), (dotted("x"), s.xd), (dotted("y"), s.yd),
-        ("omega", s.omega), (dotted("x", 2), s.xdd), (dotted("y", 2), s.ydd), ("alpha", s.alpha),
-    )  # fmt: skip
-    for word, symbols in words:
-        for name, symbol in zip(names, symbols, strict=True):
-            shown.setdefault(symbol, sp.Symbol(f"{word}_{name}"))
-    for body, (fx, fy) in zip(model.bodies, s.force, strict=True):
-        shown[fx] = sp.Symbol(f"f_{body.joint.name},x")
-        shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
-    for formula, symbol in s.formulas.items():
-        shown[symbol] = sp.Symbol(written(formula))
+    shown = {symbol.name: written(formula) for formula, symbol in s.formulas.items()}
+    words = {
+        "x": "x", "xd": dotted("x"), "xdd": dotted("x", 2), "y": "y", "yd": dotted("y"),
+        "ydd": dotted("y", 2), "angle": "psi", "omega": "omega", "alpha": "alpha",
+    }  # fmt: skip
+    for body in model.bodies:
+        shown |= {f"{word}__{body.name}": f"{name}_{body.name}" for word, name in words.items()}
+        joint = body.joint.name
+        shown |= {f"f{axis}__{joint}": f"f_{joint},{axis}" for axis in "xy"}
     short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j",
              "effort": "tau"}  # fmt: skip
     for symbol in (*equations.free_bodies.efforts, *dict(equations.solution.definitions)):
         kind, _, rest = symbol.name.partition("__")
-        if symbol not in shown and kind in short:
+        if symbol.name not in shown and kind in short:
             rest = rest.replace("__", ",")
             brief = f"{short[kind]}_{rest}"
-            shown[symbol] = sp.Symbol(f"{kind}_{rest}" if brief in taken else brief)
+            shown[symbol.name] = f"{kind}_{rest}" if brief in taken else brief
     return shown
 
 

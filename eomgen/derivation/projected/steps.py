@@ -1,6 +1,7 @@
 """The projected-constraints derivation, step by step, like the handout's by `derivation.steps`."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import sympy as sp
 
@@ -10,7 +11,7 @@ from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.reading import brief_coordinates, short_name, words_on_names
 from eomgen.derivation.rewriting import gathered
-from eomgen.derivation.steps import Equation, Kind, Pairs, Step
+from eomgen.derivation.steps import Equation, Pairs, Step, terms_steps
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 from eomgen.model.model import Model
@@ -22,8 +23,6 @@ LONGEST = 160
 """Operations of an expression up to which it is gathered for reading."""
 SLACK = 2.5
 """How much longer than its shortest form a sum may be whose terms are to be seen."""
-Titled = tuple[Kind, str, str, Pairs]
-"""Kind, title, words and lines of a step, these in the derivation's own symbols."""
 PARTS = "Parts of the motion"
 PARTS_ARE = (
     "These parts have names, to keep what follows short. ω, u with a velocity as index are the "
@@ -36,27 +35,22 @@ PARTS_ARE = (
 def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
     joints = tuple(_joints(equations))
-    steps = []
-    for part in (*joints, *_balance(equations, joints), *_solution(equations)):
-        kind, title, words, pairs = part
-        lines = read_pairs(equations, pairs, moving=kind in ("state", "joint", "motion"))
-        steps.append(Step(kind, title, words, lines))
-    return tuple(steps)
+    steps = (*joints, *_balance(equations, joints), *_solution(equations))
+    return tuple(read_step(equations, step) for step in steps)
 
 
-def read_pairs(
-    equations: ProjectedEquations, pairs: Pairs, *, moving: bool = False
-) -> tuple[Equation, ...]:
-    """Lines in symbols meant for reading, but for those that then say nothing. Where they are not
-    on a motion as a whole, α^0 and a^0 are its accelerations where v̇ = 0.
+def read_step(equations: ProjectedEquations, step: Step, *, moving: bool = False) -> Step:
+    """A step in symbols meant for reading, without lines that then say nothing. Unless it is on a
+    motion as a whole (`moving`), α^0 and a^0 are accelerations where v̇ = 0.
     """
     shown = readable_symbols(equations)
-    if not moving:
+    if not moving and step.kind not in ("state", "joint", "motion"):
         shown |= _without_rates(equations, shown)
     given = equations.symbols.numbers.items()
     numbers = {symbol: sp.Float(float(x), DIGITS) for x, symbol in given}
+    pairs = [(line.left, line.right) for line in step.equations]
     lines = [Equation(*(x.xreplace(numbers).xreplace(shown) for x in pair)) for pair in pairs]
-    return tuple(line for line in lines if line.left != line.right)
+    return replace(step, equations=tuple(line for line in lines if line.left != line.right))
 
 
 def _without_rates(equations: ProjectedEquations, shown: dict[Expr, Expr]) -> dict[Expr, Expr]:
@@ -70,11 +64,11 @@ def _without_rates(equations: ProjectedEquations, shown: dict[Expr, Expr]) -> di
     return found
 
 
-def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
+def _joints(equations: ProjectedEquations) -> Iterator[Step]:
     """The state, and each joint as a constraint with its derivatives."""
     s, model = equations.symbols, equations.model
     plane = model.dimensions == 2
-    yield (
+    yield Step.of(
         "state",
         "State",
         state_words(model),
@@ -90,18 +84,18 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
         own = [(symbol, e) for symbol, e in definitions if symbol.name.split("__")[1] == body.name]
         whole = c.axes * c.rotation
         position = c.axes * c.reach - whole * c.arm
-        pairs: Pairs = [(symbol, e) for symbol, e in own if is_turn(symbol)]
+        pairs = [(symbol, e) for symbol, e in own if is_turn(symbol)]
         size = 2 if plane else 3
         if whole != sp.eye(3):
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
         pairs.append((sp.Symbol(f"r_{body.name}"), position[:size, :].applyfunc(_short)))
-        yield (
+        yield Step.of(
             "joint",
             f"Joint `{body.joint.name}`: {body.joint.type}, `{parent}` to `{body.name}`",
             _joint_words(body.name, parent, turns=whole != sp.eye(3)),
             pairs,
         )
-        yield (
+        yield Step.of(
             "motion",
             f"Joint `{body.joint.name}`, differentiated twice",
             f"Angular velocity ω and velocity u of the centre of mass of `{body.name}`, and their "
@@ -180,28 +174,23 @@ def _short(expression: Expr) -> Expr:
     return gathered(expression, frozenset())
 
 
-def _balance(equations: ProjectedEquations, before: Sequence[Titled]) -> Iterator[Titled]:
+def _balance(equations: ProjectedEquations, before: Sequence[Step]) -> Iterator[Step]:
     """M, V, G, F; what is said `before` of angular velocities is not said again."""
-    said = {symbol for *_, pairs in before for symbol, _ in pairs}
+    said = {line.left for step in before for line in step.equations}
     said = {symbol for symbol in said if symbol.name.startswith("omega__")}
     terms, model = equations.balance, equations.model
     named = named_parts(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
     named = [pair for pair in named if pair[0] not in said]
     if named:
-        yield ("balance", PARTS, PARTS_ARE, named)
+        yield Step.of("balance", PARTS, PARTS_ARE, named)
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
-    yield (
-        "equations",
-        "Virtual power",
+    words = (
         "For every velocity that the joints leave free, the forces of inertia do the work of "
         f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
         "M dv/dt + V + G = F; first the mass matrix, which is symmetric (entries that are not "
-        "written are 0, or stand on the other side of the diagonal),",
-        [(sp.Symbol("M"), terms.M)],
+        "written are 0, or stand on the other side of the diagonal),"
     )
-    yield "equations", "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
-    yield "equations", "Gravity forces", "", [(sp.Symbol("G"), terms.G)]
-    yield "equations", "Applied forces", "", [(sp.Symbol("F"), terms.F)]
+    yield from terms_steps("Virtual power", words, terms)
 
 
 def named_parts(equations: ProjectedEquations, expressions: Sequence[Expr]) -> Pairs:
@@ -215,7 +204,7 @@ def _motion(equations: ProjectedEquations) -> Pairs:
     return [*equations.solution.definitions.items()][: equations.motion_definitions]
 
 
-def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
+def _solution(equations: ProjectedEquations) -> Iterator[Step]:
     """The closed form without the generalised forces, which only `forward_dynamics` has."""
     s, terms = equations.symbols, equations.balance
     still = dict.fromkeys(s.tau, sp.Integer(0))
@@ -224,7 +213,7 @@ def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
     pairs = [
         (x, _flat(e, s.fixed)) for x, e in needed_by(s.a, every) if not is_turn(x) and x not in said
     ]
-    yield (
+    yield Step.of(
         "solution",
         "Closed form",
         "Gauss: of all motions that the joints allow, the true one has the least sum of weighted "
