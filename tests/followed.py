@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from eomgen.derivation.acting import used_bodies
+from eomgen.derivation.articulated import recursive_steps
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect, derived_effects
 from eomgen.derivation.evaluate import Numbers, array, define, follow, number
@@ -15,7 +16,6 @@ from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.own_names import own_name
 from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import reading_names
-from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import names_of_scene, of_scene
 from eomgen.dynamics.dynamics import Dynamics, Values

@@ -11,10 +11,10 @@ from eomgen.program.tape import TIME
 
 if TYPE_CHECKING:
     from eomgen.derivation.exercise import Exercise
-    from eomgen.derivation.exposition import Exposition
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
     from eomgen.derivation.symbols import Expr
+    from eomgen.derivation.telling import Exposition
 
 NUMBERS = (
     "m = eomgen.load(eomgen.generate(scene, outputs=['mass_matrix', 'velocity_force', "

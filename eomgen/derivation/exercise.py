@@ -9,7 +9,7 @@ import sympy as sp
 from eomgen.base.displays import Displayed
 from eomgen.base.errors import SceneError
 from eomgen.derivation.definitions import written_out, written_size
-from eomgen.derivation.exposition import Exposition, exposition_of
+from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.own_names import names_within
@@ -17,6 +17,7 @@ from eomgen.derivation.reading import read, read_all, reading_names
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.telling import Exposition
 from eomgen.language.formula import ZERO
 from eomgen.language.rewriting import times
 from eomgen.model.model import Model

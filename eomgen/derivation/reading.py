@@ -133,6 +133,11 @@ def read_all(equations: Sequence[Equation], names: Mapping[str, str]) -> tuple[E
     return tuple(e for e in found if e.left != e.right)
 
 
+def renamed(step: Step, names: Mapping[str, str]) -> Step:
+    """A step with the names that are read."""
+    return replace(step, equations=read_all(step.equations, names))
+
+
 def brief(steps: Sequence[Step]) -> tuple[Step, ...]:
     """Steps in which poses and motions that are a number or one symbol, and forces that are 0, are
     put in wherever a later line has them. A pose that is nothing else is no line of its own, nor is

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import sympy as sp
 
-from eomgen.derivation.exposition import Exposition, exposition_of
+from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.identity import identical
 from eomgen.derivation.own_names import names_within
 from eomgen.derivation.reading import numbered, read
 from eomgen.derivation.simplified import size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.telling import Exposition
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form
 from eomgen.tables.details import METHODS, Method

@@ -1,0 +1,81 @@
+"""What the expositions of all derivations have in common: their state, their ends, their forces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from eomgen.derivation.acting import Parts, used_bodies
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.linkage import linkage_of
+from eomgen.derivation.matrices import (
+    Matrices,
+)
+from eomgen.derivation.poses import poses
+from eomgen.derivation.prescribed import (
+    prescribed_motion,
+)
+from eomgen.derivation.projected.steps import state_words
+from eomgen.derivation.reading import (
+    brief,
+    numbered,
+)
+from eomgen.derivation.state_forms import form_step, plain_form
+from eomgen.derivation.steps import Definition, Equation, Kind, Step
+from eomgen.derivation.symbols import real
+from eomgen.model.model import Model
+
+
+@dataclass(frozen=True)
+class Exposition:
+    """The steps of a derivation, and its equations as matrices unless they are too long."""
+
+    steps: tuple[Step, ...]
+    matrices: Matrices | None
+    effects: tuple[DerivedEffect, ...]
+
+
+def state_step(model: Model) -> Step:
+    """Coordinates and velocities, and those that are prescribed."""
+    state = [
+        Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
+        for letter, group in (("q", model.coordinates), ("v", model.velocities))
+    ]
+    state += [Equation(*pair) for pair in prescribed_motion(model)]
+    return Step("state", "State", state_words(model), tuple(state))
+
+
+def last_step(model: Model, parts: Parts) -> Step:
+    """The state and its derivative, the accelerations by the steps before."""
+    form = plain_form(model, [real(c.acceleration) for c in model.velocities])
+    return form_step(model, "velocity", form, parts.effects)
+
+
+def told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts) -> Exposition:
+    """Steps numbered from one, after an introduction if there is one."""
+    whole = numbered(brief(steps))
+    first = (Step("introduction", "An algorithm", intro, ()),) if intro else ()
+    return Exposition((*first, *whole), matrices, parts.loads)
+
+
+def first_of(steps: Sequence[Step], *kinds: Kind) -> int:
+    """The place of the first step of these kinds."""
+    return next(i for i, step in enumerate(steps) if step.kind in kinds)
+
+
+def with_forces(found: Matrices, model: Model, parts: Parts, following: int = 0) -> Matrices:
+    """The matrices with the forces of effects written out, after `following` definitions."""
+    needed = dict.fromkeys(body for derived in parts.effects for body in used_bodies(derived))
+    placed, _ = poses(linkage_of(model), needed)
+    more = [*prescribed_motion(model), *placed]
+    more += [pair for derived in parts.effects for pair in derived.definitions]
+    if not more:
+        return found
+    known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}
+    known |= {s.name: s for s in (*found.q, *found.v)}
+    definitions: list[Definition] = [
+        (symbol, e.xreplace({s: known.get(s.name, s) for s in e.free_symbols}))
+        for symbol, e in more
+    ]
+    before, after = found.definitions[:following], found.definitions[following:]
+    return replace(found, definitions=(*before, *definitions, *after))
