@@ -17,7 +17,7 @@ from eomgen.derivation.handout.closed import Equations, conditions
 from eomgen.derivation.handout.forms import state_form
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.projected.equations import Balance
+from eomgen.derivation.terms import Terms
 from eomgen.language.formula import evaluate
 from eomgen.model.model import Model
 from eomgen.program.lower import Lowering
@@ -41,7 +41,7 @@ class ClosedForm:
     numbers: Mapping[Real, Any]
     definitions: Mapping[Any, Any]
     conditions: tuple[tuple[str, Any, bool], ...]
-    balance: Balance | None = None
+    balance: Terms | None = None
 
 
 def of_projected(equations: ProjectedEquations) -> ClosedForm:

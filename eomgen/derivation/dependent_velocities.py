@@ -19,6 +19,7 @@ from eomgen.derivation.poses import poses
 from eomgen.derivation.simplified import size
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.terms import Terms
 from eomgen.model.model import Model
 
 
@@ -52,21 +53,15 @@ def of_freedoms(
     M = sp.Matrix(n, n, lambda i, j: names.named(f"M_{words[min(i, j)]},{words[max(i, j)]}",
                                                  tree.M[i, j]) if i >= j else 0)  # fmt: skip
     M = sp.Matrix(n, n, lambda i, j: M[max(i, j), min(i, j)])
-    forces = {letter: _column(letter, getattr(tree, letter), words, names) for letter in "VGF"}
-    reduced, vectors = projected(K, kappa, M, forces)
+    forces = (_column(letter, getattr(tree, letter), words, names) for letter in "VGF")
+    reduced = projected(K, kappa, Terms(M, *forces))
     dependent = {column for _, column in model.pivots}
     free = [j for j in range(n) if j not in dependent]
-    rates = [real(model.velocities[j].acceleration) for j in free]
-    right = vectors["F"] - vectors["V"] - vectors["G"]
+    rates = tuple(real(model.velocities[j].acceleration) for j in free)
     before = len(names.found)
-    solved = tuple(solved_for([x.name for x in rates], reduced, right))
-    return Matrices(
-        tree.q,
-        tuple(tree.v[j] for j in free),
-        tuple(rates),
-        *(reduced, vectors["V"], vectors["G"], vectors["F"]),
-        *((*names.found, *solved), tree.formulas),
-    ), before
+    definitions = (*names.found, *solved_for([x.name for x in rates], reduced))
+    v = tuple(tree.v[j] for j in free)
+    return Matrices(*reduced.whole, tree.q, v, rates, definitions, tree.formulas), before
 
 
 def _column(letter: str, vector: Expr, words: Sequence[str], names: _Names) -> Expr:

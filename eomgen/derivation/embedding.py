@@ -9,7 +9,7 @@ differentiated twice, one polygon after another. What is left has one equation f
     M̂ u̇ + V̂ + Ĝ = F̂,    M̂ = KᵀM K,    V̂ = Kᵀ(V + M κ),    Ĝ = KᵀG,    F̂ = KᵀF
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr, of_scene, real
+from eomgen.derivation.terms import Terms
 from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.model.groups import Group
@@ -286,23 +287,20 @@ def _shortened(
     return [*found, *rooted], [short(e) for e in values]
 
 
-def projected(
-    K: Expr, kappa: Expr, M: Expr, forces: Mapping[str, Expr]
-) -> tuple[Expr, dict[str, Expr]]:
-    """M̂, and V̂, Ĝ, F̂ by their letters, from those of the tree."""
+def projected(K: Expr, kappa: Expr, tree: Terms) -> Terms:
+    """M̂, V̂, Ĝ, F̂ from those of the tree."""
     turned = K.T
-    reduced = simplified(turned * M * K)
-    moved = {**forces, "V": forces["V"] + M * kappa}
-    return reduced, {letter: simplified(turned * e) for letter, e in moved.items()}
+    M, V = turned * tree.M * K, turned * (tree.V + tree.M * kappa)
+    return Terms(M, V, turned * tree.G, turned * tree.F).each(simplified)
 
 
-def solved_for(names: Sequence[str], M: Expr, right: Expr) -> Iterator[Definition]:
+def solved_for(names: Sequence[str], terms: Terms) -> Iterator[Definition]:
     """u̇ by elimination from the last freedom to the first: pivots, then accelerations in order."""
+    M, right = sp.Matrix(terms.M), sp.Matrix(terms.right)
     k = M.rows
     if k == 1:
         yield real(names[0]), simplified(right[0] / M[0, 0])
         return
-    M, right = sp.Matrix(M), sp.Matrix(right)
     words = [name.removesuffix("_ddot").removesuffix("_dot") for name in names]
     for j in range(k - 1, 0, -1):
         pivot, own = real(f"d_{words[j]}"), real(f"b_{words[j]}")

@@ -27,9 +27,6 @@ from eomgen.derivation.prescribed import (
     PRESCRIBED,
     freed,
 )
-from eomgen.derivation.reading import (
-    renamed,
-)
 from eomgen.derivation.steps import Step
 from eomgen.derivation.supported import (
     MOST_REPORTED,
@@ -133,8 +130,7 @@ def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
         steps += [*effects, *constraint_steps(model, parts.constraints), *tree]
         steps += elimination_steps(model, parts.constraints)
     steps += [*impact_steps(model, parts.effects), last_step(model, parts)]
-    names = names_within(model)
-    return told(RECURSIVE, [renamed(step, names) for step in steps], None, parts)
+    return told(RECURSIVE, steps, names_within(model), None, parts)
 
 
 def _free_words(model: Model) -> str:

@@ -20,8 +20,9 @@ from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import short_name
 from eomgen.derivation.rotations import rate
 from eomgen.derivation.simplified import simplified, size
-from eomgen.derivation.steps import Equation, Step, terms_steps
+from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.terms import terms_steps
 from eomgen.model.model import Model
 
 MOST = 1500

@@ -1,6 +1,6 @@
 """The derived equations as SymPy matrices over the names of a scene."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sympy as sp
 
@@ -9,15 +9,15 @@ from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.terms import Terms
 from eomgen.language.formula import Formula, written
 
 
 @dataclass(frozen=True)
-class Matrices:
+class Matrices(Terms):
     """M v̇ + V + G = F, and v̇.
 
     q, v, a      symbols of coordinates, velocities and accelerations v̇
-    M, V, G, F   mass matrix (nv, nv); forces of velocity, gravity and all else (nv, 1)
     definitions  the solution in order: each symbol over those before it, in the end all of `a`
     formulas     symbols that stand for formulas of the scene with functions in them, written out
     """
@@ -25,10 +25,6 @@ class Matrices:
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
-    M: Expr
-    V: Expr
-    G: Expr
-    F: Expr
     definitions: tuple[Definition, ...]
     formulas: dict[Expr, str]
 
@@ -39,12 +35,8 @@ def of_pins(equations: Equations) -> Matrices:
     still = dict.fromkeys(s.tau, sp.S.Zero)
     poses = [*_poses(equations), *equations.free_bodies.efforts.items()]
     solved = [(symbol, value.xreplace(still)) for symbol, value in equations.solution.definitions]
-    M, V, G, F = (written_out(m, poses) for m in (rows.M, rows.V, rows.G, rows.F))
-    return Matrices(
-        *(s.q, s.v, s.a, M, V, G, F),
-        (*poses, *solved),
-        _formulas(s.formulas),
-    )
+    whole = rows.each(lambda m: written_out(m, poses)).whole
+    return Matrices(*whole, s.q, s.v, s.a, (*poses, *solved), _formulas(s.formulas))
 
 
 def _poses(equations: Equations) -> list[Definition]:
@@ -67,17 +59,14 @@ def of_projected(equations: ProjectedEquations) -> Matrices:
     definitions = projected_definitions(equations)
     motion = [pair for pair in definitions[: equations.motion_definitions] if not is_turn(pair[0])]
     given = _given(equations)
-    M, V, G, F = (
-        written_out(m.xreplace(given), motion) for m in (found.M, found.V, found.G, found.F)
-    )
-    return Matrices(*(s.q, s.v, s.a, M, V, G, F), definitions, _formulas(s.formulas))
+    whole = found.each(lambda m: written_out(m.xreplace(given), motion)).whole
+    return Matrices(*whole, s.q, s.v, s.a, definitions, _formulas(s.formulas))
 
 
 def over_coordinates(found: Matrices) -> Matrices:
     """The same over coordinates: entries of rotations by what they stand for."""
     turns = [pair for pair in found.definitions if is_turn(pair[0])]
-    letters = {x: written_out(getattr(found, x), turns) for x in "MVGF"}
-    return replace(found, **letters)
+    return found.each(lambda e: written_out(e, turns))
 
 
 def projected_definitions(equations: ProjectedEquations) -> tuple[Definition, ...]:

@@ -24,8 +24,9 @@ from eomgen.derivation.projected.steps import (
     still_symbols,
 )
 from eomgen.derivation.rotations import rate
-from eomgen.derivation.steps import Pairs, Step, terms_steps
+from eomgen.derivation.steps import Pairs, Step
 from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.terms import terms_steps
 
 MOST = 1200
 """The operations of the equations up to which they are written out."""
@@ -145,7 +146,7 @@ def _rate(equations: ProjectedEquations, vector: Expr) -> Expr:
 def has_named_accelerations(equations: ProjectedEquations) -> bool:
     """Whether in M v̇ + V + G = F α or a of a body are what is left of them where v̇ = 0."""
     own, terms = _accelerations(equations), equations.balance
-    needed = named_parts(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
+    needed = named_parts(equations, terms.whole)
     return any(symbol in own for symbol, _ in needed)
 
 
@@ -195,7 +196,7 @@ def _steps(equations: ProjectedEquations, found: JointForces) -> Iterator[Step]:
     terms = equations.balance
     own = dict.fromkeys(_accelerations(equations), sp.S.Zero)
     whole = [x.xreplace(own) for pair in (*found.balances, *found.rows) for x in pair]
-    if named := named_parts(equations, [*whole, *terms.M, *terms.V, *terms.G, *terms.F]):
+    if named := named_parts(equations, [*whole, *terms.whole]):
         yield step(PARTS, PARTS_ARE, named)
     yield step("Newton's and Euler's equations", FREE_BODIES, found.balances)
     if found.forces:

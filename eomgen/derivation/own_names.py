@@ -30,12 +30,8 @@ def with_names_of_scene(found: Matrices, model: Model) -> Matrices:
     """Matrices over the names of a scene, without marks."""
     given = names_of_scene(model)
     plain = {name: own_name(name) for name in given} | {name + OF_SCENE: name for name in given}
-    whole = (found.M, found.V, found.G, found.F)
-    return replace(
-        found,
-        **{letter: read(e, plain) for letter, e in zip("MVGF", whole, strict=True)},
-        definitions=tuple((read(s, plain), read(e, plain)) for s, e in found.definitions),
-    )
+    definitions = tuple((read(s, plain), read(e, plain)) for s, e in found.definitions)
+    return replace(found.each(lambda e: read(e, plain)), definitions=definitions)
 
 
 def other_names(steps: Sequence[Step], model: Model) -> str:

@@ -92,29 +92,21 @@ def freedom_steps(
     matrices, without the definitions of effects.
     """
     model, K = found.model, found.K
-    whole = [e.xreplace(found.same) for e in (tree.M, tree.V, tree.G, tree.F)]
-    M, vectors = projected(K, found.kappa, whole[0], dict(zip("VGF", whole[1:], strict=True)))
-    k = K.cols
-    letters = [
-        Equation(sp.Symbol("M_r"), M),
-        *(Equation(sp.Symbol(f"{x}_r"), e) for x, e in vectors.items()),
-    ]
-    if k == 1:
-        letters = [Equation(line.left, line.right[0]) for line in letters]
+    reduced = projected(K, found.kappa, tree.each(lambda e: e.xreplace(found.same)))
+    k, names = K.cols, zip("MVGF", reduced.whole, strict=True)
+    letters = [Equation(sp.Symbol(f"{x}_r"), e[0] if k == 1 else e) for x, e in names]
     motions = [Equation(sp.Symbol("K"), K)] if k > 1 or K.rows > 1 else []
     if any(found.kappa):
         motions.append(Equation(sp.Symbol("kappa"), found.kappa))
     steps = [Step("equations", "One equation for each freedom", FREE, (*motions, *letters))]
-    names = [model.velocities[j].acceleration for j in found.independent]
-    right = vectors["F"] - vectors["V"] - vectors["G"]
-    solved = tuple(solved_for(names, M, right))
+    rates = tuple(real(model.velocities[j].acceleration) for j in found.independent)
+    solved = tuple(solved_for([x.name for x in rates], reduced))
     shown: Sequence[Definition] = solved
     words = "Solved for the accelerations of the freedoms; those of the other coordinates follow."
     if k == 1 and size(solved[0][1]) > MOST_WRITTEN:
-        one = [real(f"{x}_r") for x in "FVGM"]
-        kept = [x for x, e in zip(one[:3], (vectors[y][0] for y in "FVG"), strict=True) if e != 0]
-        total = sum((x if x.name[0] == "F" else -x for x in kept), sp.S.Zero)
-        shown = [(solved[0][0], total / one[3])]
+        signs = (("F", 1), ("V", -1), ("G", -1))
+        kept = (sign * real(f"{x}_r") for x, sign in signs if getattr(reduced, x)[0] != 0)
+        shown = [(solved[0][0], sum(kept, sp.S.Zero) / real("M_r"))]
     elif k > 1:
         words += (
             " From the last freedom to the first each is eliminated: d is a pivot, and b what is "
@@ -122,18 +114,15 @@ def freedom_steps(
         )
     steps.append(Step("solution", "Solved", words, tuple(equations_of(shown))))
     steps += _force_steps(found, tree, constraints)
-    reduced = Matrices(
+    matrices = Matrices(
+        *reduced.whole,
         tuple(real(model.coordinates[i].name) for i in model.state_coordinates),
         tuple(real(model.velocities[j].name) for j in found.independent),
-        tuple(real(name) for name in names),
-        M,
-        vectors["V"],
-        vectors["G"],
-        vectors["F"],
+        rates,
         (*found.definitions, *solved),
         tree.formulas,
     )
-    return steps, reduced
+    return steps, matrices
 
 
 def _force_steps(

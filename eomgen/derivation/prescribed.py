@@ -10,6 +10,7 @@ from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.steps import Definition, Equation, Step
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import real
+from eomgen.derivation.terms import Terms
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Model
@@ -56,14 +57,13 @@ def left_free(model: Model, whole: Matrices) -> Matrices:
     for j, (v, a) in enumerate(zip(whole.v, whole.a, strict=True)):
         if v.name in given and v not in still:
             kappa[j] = a
-    forces = {x: getattr(whole, x).xreplace(still) for x in "VGF"}
-    M, vectors = projected(K, kappa, whole.M, forces)
+    tree = Terms(whole.M, *(e.xreplace(still) for e in whole.whole[1:]))
     states = {c.name for c in model.coordinates}
     return Matrices(
+        *projected(K, kappa, tree).whole,
         tuple(x for x in whole.q if x.name in states),
         tuple(whole.v[j] for j in free),
         tuple(whole.a[j] for j in free),
-        *(M, vectors["V"], vectors["G"], vectors["F"]),
         *(whole.definitions, whole.formulas),
     )
 

@@ -1,10 +1,8 @@
 """What a derivation that is to be read consists of."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
-
-import sympy as sp
+from typing import Literal
 
 from eomgen.derivation.symbols import Expr
 from eomgen.tables.details import Detail, Method
@@ -74,10 +72,3 @@ class Step:
     def figure(self) -> str:
         """The sketch that belongs beside the words: "mechanism", "bodies", or none."""
         return FIGURES.get(self.kind, "")
-
-
-def terms_steps(title: str, words: str, terms: Any) -> Iterator[Step]:
-    """M, V, G and F of M v̇ + V + G = F, a step each; that of M has its own title and words."""
-    whole = (("M", title, words), ("V", "Velocity forces", ""), ("G", "Gravity forces", ""))
-    for letter, name, about in (*whole, ("F", "Applied forces", "")):
-        yield Step.of("equations", name, about, [(sp.Symbol(letter), getattr(terms, letter))])

@@ -1,6 +1,6 @@
 """What the expositions of all derivations have in common: their state, their ends, their forces."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -11,18 +11,16 @@ from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.matrices import (
     Matrices,
 )
+from eomgen.derivation.own_names import names_within
 from eomgen.derivation.poses import poses
 from eomgen.derivation.prescribed import (
     prescribed_motion,
 )
 from eomgen.derivation.projected.steps import state_words
-from eomgen.derivation.reading import (
-    brief,
-    numbered,
-)
+from eomgen.derivation.reading import brief, numbered, renamed
 from eomgen.derivation.state_forms import form_step, plain_form
 from eomgen.derivation.steps import Definition, Equation, Kind, Step
-from eomgen.derivation.symbols import real
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 
 
@@ -51,9 +49,22 @@ def last_step(model: Model, parts: Parts) -> Step:
     return form_step(model, "velocity", form, parts.effects)
 
 
-def told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts) -> Exposition:
-    """Steps numbered from one, after an introduction if there is one."""
-    whole = numbered(brief(steps))
+def names_of_symbols(model: Model, formulas: Mapping[Expr, str]) -> dict[str, str]:
+    """How all symbols of a derivation are read; some stand for formulas."""
+    names = names_within(model) | {s.name: text for s, text in formulas.items()}
+    both = [f"{i}{j}" for i in "xyz" for j in "xyz"]
+    return names | {f"R__{b.name}__{ij}": f"R_{b.name},{ij}" for b in model.bodies for ij in both}
+
+
+def told(
+    intro: str,
+    steps: Sequence[Step],
+    names: Mapping[str, str],
+    matrices: Matrices | None,
+    parts: Parts,
+) -> Exposition:
+    """Steps with names that are read, numbered from one, after an introduction if there is one."""
+    whole = numbered(brief([renamed(step, names) for step in steps]))
     first = (Step("introduction", "An algorithm", intro, ()),) if intro else ()
     return Exposition((*first, *whole), matrices, parts.loads)
 
@@ -71,7 +82,7 @@ def with_forces(found: Matrices, model: Model, parts: Parts, following: int = 0)
     more += [pair for derived in parts.effects for pair in derived.definitions]
     if not more:
         return found
-    known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}
+    known = {s.name: s for e in found.whole for s in e.free_symbols}
     known |= {s.name: s for s in (*found.q, *found.v)}
     definitions: list[Definition] = [
         (symbol, e.xreplace({s: known.get(s.name, s) for s in e.free_symbols}))

@@ -2,9 +2,8 @@
 small tree, and what constraints leave free of one.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from eomgen.derivation.acting import Parts, effect_steps
 from eomgen.derivation.dependent_velocities import of_freedoms
@@ -45,7 +44,15 @@ from eomgen.derivation.simplified import simplified, solved_directly, tidied
 from eomgen.derivation.state_forms import form_step, momentum_form
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.derivation.telling import Exposition, first_of, last_step, state_step, told, with_forces
+from eomgen.derivation.telling import (
+    Exposition,
+    first_of,
+    last_step,
+    names_of_symbols,
+    state_step,
+    told,
+    with_forces,
+)
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form
 from eomgen.tables.details import Method
@@ -68,39 +75,37 @@ FREE = "Each body by itself, with its weight, the forces of the effects, and tho
 
 
 def of_pins_written(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
+    """A small tree of pins and free bodies in the plane by the handout; `bare` is it alone."""
     equations = collected_equations(bare)
-    equations = replace(equations, symmetric=_each(equations.symmetric, simplified))
+    equations = replace(equations, symmetric=equations.symmetric.each(simplified))
     s, rows = equations.symbols, equations.symmetric
-    direct = solved_directly(rows.M, rows.F - rows.V - rows.G) if form == "velocity" else None
+    direct = solved_directly(rows.M, rows.right) if form == "velocity" else None
     if direct is None:
         equations = solved_pins(equations)
-    equations = replace(equations, collected=_each(equations.collected, tidied))
+    equations = replace(equations, collected=equations.collected.each(tidied))
     names = names_within(model)
     names |= {own: names.get(name, name) for own, name in readable(equations).items()}
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
-    steps = [renamed(step, names) for step in handout_steps(equations)]
+    steps = [*handout_steps(equations)]
     place = first_of(steps, "solution")
     whole = with_forces(of_pins(equations), model, parts)
     if direct is not None:
         lines = dict(zip(s.a, direct, strict=True))
-        steps[place] = renamed(_directly(steps[place], lines), names)
+        steps[place] = _directly(steps[place], lines)
         whole = _with(whole, direct)
     last = last_step(model, parts)
     if form != "velocity":
         last = form_step(model, form, momentum_form(equations), parts.effects)
     ends = [*symmetry_steps(equations), *impact_steps(model, parts.effects), last]
-    inner = _numbered_within(effect_steps(model, parts), "36")
-    steps = [
-        *steps[:place],
-        *(renamed(step, names) for step in inner),
-        *steps[place:],
-        *(renamed(step, names) for step in numbered(ends, 39)),
+    inner = [
+        replace(step, number=f"(36.{i})") for i, step in enumerate(effect_steps(model, parts), 1)
     ]
+    steps = [*steps[:place], *inner, *steps[place:], *numbered(ends, 39)]
+    steps = [renamed(step, names) for step in steps]
     if not is_of_handout(model):
         return Exposition(renumbered(steps), whole, parts.loads)
-    return Exposition(
-        (Step("introduction", "The handout", HANDOUT, ()), *steps), whole, parts.loads
-    )
+    introduction = Step("introduction", "The handout", HANDOUT, ())
+    return Exposition((introduction, *steps), whole, parts.loads)
 
 
 def _directly(step: Step, found: Mapping[Expr, Expr]) -> Step:
@@ -114,11 +119,6 @@ def _with(found: Matrices, direct: Sequence[Expr]) -> Matrices:
     return replace(found, definitions=(*found.definitions, *solution))
 
 
-def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
-    """M, V, G and F changed."""
-    return replace(found, **{x: change(getattr(found, x)) for x in "MVGF"})
-
-
 def of_any_written(
     model: Model, bare: Model, parts: Parts, method: Method | None, *, shared: bool
 ) -> Exposition | None:
@@ -127,18 +127,16 @@ def of_any_written(
     With `shared` its steps from the equations of motion on are the same by all methods.
     """
     equations = balanced(bare)
-    equations = replace(equations, balance=_each(equations.balance, simplified))
+    equations = replace(equations, balance=equations.balance.each(simplified))
     whole = tree = of_projected(equations)
     if model.prescribed and not parts.constraints:
         tree = left_free(model, whole)
-    direct = solved_directly(tree.M, tree.F - tree.V - tree.G) if not parts.constraints else None
+    direct = solved_directly(tree.M, tree.right) if not parts.constraints else None
     by_gauss = direct is None and method in (None, "kane")
     by_gauss = by_gauss and not (shared or parts.constraints or model.prescribed)
     if by_gauss:
         equations = solved_projected(equations)
         tree = replace(tree, definitions=projected_definitions(equations))
-    names = names_within(model)
-    said = {**names, **{s.name: text for s, text in tree.formulas.items()}, **_entries(model)}
     found = projected_steps(equations)
     joints, place = first_of(found, "balance", "equations"), first_of(found, "solution")
     by_power = found[joints:place]
@@ -151,17 +149,15 @@ def of_any_written(
         way = (*kane_written(equations), *by_power)
     if way is None:
         return None
-    way = [renamed(step, said) for step in way]
-    start = [renamed(step, names) for step in _start(model, found[:joints])]
+    start = _start(model, found[:joints])
     if parts.constraints:
         keep = shared or method in ("newton-euler", "kane")
-        return _of_tied(model, parts, start, way, over_coordinates(tree), keep_motion=keep)
+        return _of_tied(model, parts, start, [*way], over_coordinates(tree), keep_motion=keep)
     solution, matrices = found[place], over_coordinates(tree)
     if not by_gauss:
         words, lines = SOLVED, dict(zip(tree.a, direct or (), strict=direct is not None))
         if direct is None:
-            right = tree.F - tree.V - tree.G
-            lines = dict(solved_for([x.name for x in tree.a], tree.M, right))
+            lines = dict(solved_for([x.name for x in tree.a], tree))
             words = f"{SOLVED} {ELIMINATED}"
         solution = replace(_directly(solution, lines), words=words)
         matrices = replace(matrices, definitions=(*matrices.definitions, *lines.items()))
@@ -169,10 +165,9 @@ def of_any_written(
     ends = [*impact_steps(model, parts.effects), last_step(model, parts)]
     if shared or method == "lagrange":
         ends[-1:-1] = euler_steps(bare, whole, equations.loads.uniform)
-    effects = [renamed(step, said) for step in effect_steps(model, parts)]
-    ends = [renamed(step, said) for step in (*left, solution, *ends)]
-    steps = [*start, *effects, *way, *ends]
-    return told("", steps, with_forces(matrices, model, parts), parts)
+    steps = [*start, *effect_steps(model, parts), *way, *left, solution, *ends]
+    names = names_of_symbols(model, tree.formulas)
+    return told("", steps, names, with_forces(matrices, model, parts), parts)
 
 
 def _start(model: Model, found: Sequence[Step]) -> list[Step]:
@@ -180,12 +175,6 @@ def _start(model: Model, found: Sequence[Step]) -> list[Step]:
     words = f"{FREE} {PRESCRIBED}" if model.prescribed else FREE
     state = state_step(model) if model.prescribed else found[0]
     return [state, Step("bodies", "Free bodies", words, ()), *found[1:]]
-
-
-def _entries(model: Model) -> dict[str, str]:
-    """How the entries of joints' rotations are read."""
-    both = [f"{i}{j}" for i in "xyz" for j in "xyz"]
-    return {f"R__{b.name}__{ij}": f"R_{b.name},{ij}" for b in model.bodies for ij in both}
 
 
 def _of_tied(
@@ -198,7 +187,6 @@ def _of_tied(
     keep_motion: bool,
 ) -> Exposition:
     """A small mechanism with constraints: the tree, then what the constraints leave free."""
-    matrices = None
     effects = effect_steps(model, parts)
     if model.groups:
         found = embedded(model, parts.constraints)
@@ -213,11 +201,5 @@ def _of_tied(
         before, ends = [*effects], [*constraint_steps(model, parts.constraints)]
         ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
     ends += [*impact_steps(model, parts.effects), last_step(model, parts)]
-    names = names_within(model)
-    names |= {s.name: text for s, text in tree.formulas.items()}
-    before, ends = ([renamed(step, names) for step in x] for x in (before, ends))
-    return told("", [*start, *before, *balance, *ends], matrices, parts)
-
-
-def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
-    return [replace(step, number=f"({number}.{i})") for i, step in enumerate(steps, 1)]
+    names = names_of_symbols(model, tree.formulas)
+    return told("", [*start, *before, *balance, *ends], names, matrices, parts)

@@ -6,7 +6,6 @@ import sympy as sp
 
 from eomgen.base.errors import SceneError
 from eomgen.derivation.handout.elimination import (
-    Collected,
     body_rows,
     collect,
     joint_forces,
@@ -21,6 +20,7 @@ from eomgen.derivation.rewriting import by_variables, tidy
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.terms import Terms
 from eomgen.language.formula import is_zero
 from eomgen.model.model import Model
 
@@ -36,8 +36,8 @@ class Equations:
 
     kinematics: Kinematics
     free_bodies: FreeBodies
-    collected: Collected
-    symmetric: Collected
+    collected: Terms
+    symmetric: Terms
     solution: Solution
     joint_force: tuple[Definition, ...]
 
@@ -61,8 +61,8 @@ def derive(model: Model) -> Equations:
 
 def solved(equations: Equations) -> Equations:
     """The same with their solution."""
-    rows, kin = equations.collected, equations.kinematics
-    right_side = body_rows(kin, rows.F - rows.V - rows.G)
+    kin = equations.kinematics
+    right_side = body_rows(kin, equations.collected.right)
     right_side += _generalised_forces(kin.model, kin.symbols)
     return replace(equations, solution=solve(kin, right_side))
 
@@ -77,8 +77,7 @@ def collected_equations(model: Model) -> Equations:
     kin = differentiate_joints(model, body_symbols(model))
     free_bodies = draw_free_bodies(kin)
     collected = collect(kin, free_bodies)
-    whole = (collected.M, collected.V, collected.G, collected.F)
-    generalised = Collected(*(symmetric(kin, matrix) for matrix in whole))
+    generalised = collected.each(lambda matrix: symmetric(kin, matrix))
     forces = _recovered_forces(kin, free_bodies)
     return Equations(kin, free_bodies, collected, generalised, Solution((), (), ()), forces)
 

@@ -15,6 +15,7 @@ from eomgen.derivation.handout.symbols import (
 )
 from eomgen.derivation.rewriting import tidy
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.terms import Terms
 from eomgen.model.model import Model
 
 
@@ -25,20 +26,6 @@ class Tree:
     root: int
     floating: bool
     bodies: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Collected:
-    """M q̈ + V + G = F, one row a coordinate (24).
-
-    The handout's rows: for a floating tree the sum of all forces (x, y), and for every body its
-    torque about its own centre of mass.
-    """
-
-    M: Expr
-    V: Expr
-    G: Expr
-    F: Expr
 
 
 def trees(model: Model) -> tuple[Tree, ...]:
@@ -85,8 +72,11 @@ def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
     return forces
 
 
-def collect(kin: Kinematics, free_bodies: FreeBodies) -> Collected:
-    """Eliminate f_j and the dependent accelerations, and collect (24)."""
+def collect(kin: Kinematics, free_bodies: FreeBodies) -> Terms:
+    """Eliminate f_j and the dependent accelerations, and collect (24), one row a coordinate: for a
+    floating tree the sum of all forces (x, y), and for every body its torque about its own centre
+    of mass.
+    """
     model, symbols = kin.model, kin.symbols
     # In the bodies' own angles and rates, expanding does not break up terms such as (θ̇ + φ̇)².
     # (22) and (23) are substituted from the leaves to the root.
@@ -109,7 +99,7 @@ def collect(kin: Kinematics, free_bodies: FreeBodies) -> Collected:
                 mass[i, j] += slope * over.coeff(a)
     gravity = -sp.Matrix(rows_without_forces(kin, free_bodies.gravity))
     applied = sp.Matrix(rows_without_forces(kin, free_bodies.applied))
-    return Collected(mass, velocity, gravity, applied)
+    return Terms(mass, velocity, gravity, applied)
 
 
 def rows_without_forces(kin: Kinematics, wrenches: Sequence[Wrench]) -> list[Expr]:

@@ -7,8 +7,9 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.elimination import rows_without_forces, symmetric, trees
+from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.reading import words_on_names
-from eomgen.derivation.steps import Equation, Pairs, Step
+from eomgen.derivation.steps import Definition, Equation, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 
@@ -60,12 +61,7 @@ def _mechanism(equations: Equations) -> Iterator[Step]:
         list(equations.free_bodies.equations),
         "(12)-(17)",
     )
-    arms = []
-    for k in held:
-        name = model.bodies[k].joint.name
-        for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
-            for axis, component in zip("xy", arm, strict=True):
-                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
+    arms = [pair for k in held for pair in _arms(kin, k)]
     yield Step.of(
         "joint", "Arms", "From each centre of mass to the joint, in world axes.", arms, "(18), (19)"
     )
@@ -91,17 +87,12 @@ def _mechanism(equations: Equations) -> Iterator[Step]:
     )
 
 
-def _arms(equations: Equations, k: int) -> Iterator[tuple[Expr, Expr]]:
-    """From the centres of mass to the joint of a body."""
-    name, kin = equations.model.bodies[k].joint.name, equations.kinematics
+def _arms(kin: Kinematics, k: int) -> Iterator[Definition]:
+    """The components of the arms of a body's joint."""
+    name = kin.model.bodies[k].joint.name
     for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
         for axis, component in zip("xy", arm, strict=True):
             yield sp.Symbol(f"r_{name},{word},{axis}"), component
-
-
-def _accelerated(equations: Equations, k: int) -> Iterator[tuple[Expr, Expr]]:
-    s = equations.symbols
-    return zip((s.xdd[k], s.ydd[k]), equations.kinematics.acceleration[k], strict=True)
 
 
 def _count(n: int) -> str:

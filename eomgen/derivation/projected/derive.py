@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from eomgen.base.errors import SceneError
 from eomgen.derivation.definitions import Ledger
 from eomgen.derivation.projected.constraints import Constraint
-from eomgen.derivation.projected.equations import Balance, Motion, balance, body_motions
+from eomgen.derivation.projected.equations import Motion, balance, body_motions
 from eomgen.derivation.projected.loads import Loads, loads_of
 from eomgen.derivation.projected.solution import Solution, solve
 from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
 from eomgen.derivation.symbols import Symbols
+from eomgen.derivation.terms import Terms
 from eomgen.model.model import Model
 
 WRITTEN, NAMED = (20, 160), (6, 40)
@@ -29,7 +30,7 @@ class ProjectedEquations:
     tree: Tree
     motions: tuple[Motion, ...]
     loads: Loads
-    balance: Balance
+    balance: Terms
     motion_definitions: int
     solution: Solution
 

@@ -15,6 +15,7 @@ from eomgen.derivation.projected.loads import BodyLoad, Loads
 from eomgen.derivation.projected.tree import Tree
 from eomgen.derivation.rewriting import gathered
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.terms import Terms
 
 ROTATIONS = (*TURNS, "W__")
 """Prefixes of names of rotation entries, which are not substituted."""
@@ -37,16 +38,6 @@ class Motion:
     alpha: Expr
     acceleration: Expr
     gravity: Expr
-
-
-@dataclass(frozen=True)
-class Balance:
-    """M v̇ + V + G = F."""
-
-    M: Expr
-    V: Expr
-    G: Expr
-    F: Expr
 
 
 def body_motions(tree: Tree, uniform: Expr) -> tuple[Motion, ...]:
@@ -113,7 +104,7 @@ def _values(symbols: Expr, vector: Expr) -> dict[Expr, Expr]:
     return {symbol: e for symbol, e in zip(symbols, vector, strict=True) if symbol != 0}
 
 
-def balance(tree: Tree, motions: Sequence[Motion], loads: Loads) -> Balance:
+def balance(tree: Tree, motions: Sequence[Motion], loads: Loads) -> Terms:
     """Collect M, V, G and F."""
     ledger, floating = tree.ledger, tree.translational
     n = len(tree.symbols.v)
@@ -155,7 +146,7 @@ def balance(tree: Tree, motions: Sequence[Motion], loads: Loads) -> Balance:
     for i in range(n):
         for j in range(i + 1):
             M[i, j] = M[j, i] = _written_out(M[i, j], ledger)
-    return Balance(M, short(V), short(G), short(F))
+    return Terms(M, short(V), short(G), short(F))
 
 
 def _written_out(entry: Expr, ledger: Ledger) -> Expr:

@@ -11,8 +11,9 @@ from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.reading import brief_coordinates, short_name, words_on_names
 from eomgen.derivation.rewriting import gathered
-from eomgen.derivation.steps import Equation, Pairs, Step, terms_steps
+from eomgen.derivation.steps import Equation, Pairs, Step
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.terms import terms_steps
 from eomgen.language.formula import written
 from eomgen.model.model import Model
 from eomgen.scene.joints.base import WORLD
@@ -179,7 +180,7 @@ def _balance(equations: ProjectedEquations, before: Sequence[Step]) -> Iterator[
     said = {line.left for step in before for line in step.equations}
     said = {symbol for symbol in said if symbol.name.startswith("omega__")}
     terms, model = equations.balance, equations.model
-    named = named_parts(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
+    named = named_parts(equations, terms.whole)
     named = [pair for pair in named if pair[0] not in said]
     if named:
         yield Step.of("balance", PARTS, PARTS_ARE, named)
