@@ -339,6 +339,18 @@ def test_independent_of_the_recursions() -> None:
                 assert not str(node.module).startswith("eomgen.program"), path
 
 
+def test_joints_are_read_in_one_place() -> None:
+    """No derivation but the linkage asks for the primitives of a joint; symbols are named there."""
+    package = Path(eomgen.derivation.projected.__file__).parents[1]
+    readers = {
+        path.name
+        for path in package.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr == "primitives"
+    }
+    assert readers == {"linkage.py", "symbols.py"}
+
+
 # Routes, modules, and the derivation shown.
 
 
