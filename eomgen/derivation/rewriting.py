@@ -1,6 +1,6 @@
 """Expressions simplified by inexpensive rewriting, in normal forms in which equal terms cancel."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import sympy as sp
@@ -191,31 +191,31 @@ def sum_of_squares(
     """
     if sp.count_ops(total) > longest:
         return total
+    written = canonical(total.xreplace(dict(sums)))
+    for form in _over_one_angle(written, {e: s for s, e in sums.items()}):
+        if is_sum_of_positive_terms(form):
+            return form
     short = gathered(total, fixed, sums)
-    written = canonical(short.xreplace(dict(sums)))
+    return short if is_sum_of_positive_terms(short) else total
+
+
+def _over_one_angle(written: Expr, names: Mapping[Expr, Expr]) -> Iterator[Expr]:
+    """A + B sin² + C cos² of one angle in its shorter forms; `names` has symbols for sums."""
     angles = {wave.args[0] for wave in written.atoms(sp.sin, sp.cos)}
-    names = {e: s for s, e in sums.items()}
+    if len(angles) != 1:
+        return
+    sine = sp.sin(*angles)
+    constant, slope = written.coeff(sine, 0), written.coeff(sine, 2)
+    if sp.expand(constant + slope * sine**2 - written) != 0:
+        return
 
     def tight(e: Expr) -> Expr:
         return _factored(e).xreplace(names)
 
-    if len(angles) == 1:
-        sine = sp.sin(angles.pop())
-        constant, slope = written.coeff(sine, 0), written.coeff(sine, 2)
-        if sp.expand(constant + slope * sine**2 - written) == 0:
-            both = _factored(constant + slope)
-            cosine = sp.cos(sine.args[0])
-            forms = (
-                _joined(tight(constant), tight(slope), sine**2),
-                _joined(tight(both), tight(-slope), cosine**2),
-                tight(constant) * cosine**2 + tight(both) * sine**2,
-            )
-            for form in forms:
-                if is_sum_of_positive_terms(form):
-                    return form
-    if is_sum_of_positive_terms(short):
-        return short
-    return total
+    yield _joined(tight(constant), tight(slope), sine**2)
+    cosine, both = sp.cos(*angles), tight(constant + slope)
+    yield _joined(both, tight(-slope), cosine**2)
+    yield tight(constant) * cosine**2 + both * sine**2
 
 
 def _joined(constant: Expr, slope: Expr, square: Expr) -> Expr:
