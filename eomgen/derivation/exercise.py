@@ -18,6 +18,7 @@ from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.derivation.telling import Exposition
+from eomgen.derivation.ways import compared
 from eomgen.language.formula import ZERO
 from eomgen.language.rewriting import times
 from eomgen.model.model import Model
@@ -109,7 +110,9 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
     arms: tuple[Equation, ...] = ()
     if seed and model.dimensions == 2 and not model.constraints:
         model, arms = _with_turned_arms(model, chance)
-        exposition = exposition_of(model) if arms else exposition
+    if arms:
+        method = exposition.method
+        exposition = compared(model) if method == "all" else exposition_of(model, method=method)
     found = exposition.matrices
     assert found is not None
     known = {c.name for c in (*model.coordinates, *model.velocities)} | {*model.defaults}

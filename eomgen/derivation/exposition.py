@@ -76,7 +76,7 @@ def exposition_of(
         steps[place] = replace(steps[place], words=first + words + gap + rest)
     if matrices is not None:
         matrices = with_names_of_scene(matrices, model)
-    return replace(found, steps=tuple(steps), matrices=matrices)
+    return replace(found, steps=tuple(steps), matrices=matrices, method=method)
 
 
 def _explained(

@@ -22,15 +22,19 @@ from eomgen.derivation.state_forms import form_step, plain_form
 from eomgen.derivation.steps import Definition, Equation, Kind, Step
 from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
+from eomgen.tables.details import All, Method
 
 
 @dataclass(frozen=True)
 class Exposition:
-    """The steps of a derivation, and its equations as matrices unless they are too long."""
+    """The steps of a derivation, and its equations as matrices unless they are too long. The method
+    is None where it is that which suits the mechanism.
+    """
 
     steps: tuple[Step, ...]
     matrices: Matrices | None
     effects: tuple[DerivedEffect, ...]
+    method: Method | All | None = None
 
 
 def state_step(model: Model) -> Step:

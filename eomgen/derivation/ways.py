@@ -63,7 +63,7 @@ def compared(model: Model, form: Form | None = None) -> Exposition:
     agree = Step("equations", "What agrees", *_agreement(model, columns))
     differ = Step("equations", "What differs", _differences(model, columns), ())
     steps = _numbered(before, dict(zip(METHODS, columns, strict=True)), [agree, differ, *after])
-    return replace(ways[0], steps=tuple(steps))
+    return replace(ways[0], steps=tuple(steps), method="all")
 
 
 def _is_written(model: Model, found: Exposition) -> bool:
