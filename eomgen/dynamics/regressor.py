@@ -99,11 +99,11 @@ def regressor(
     return columns
 
 
-def values_at_random(model: Model, numbers: Iterator[int], scalars: Scalars) -> Values:
-    """A state of a model, of whole numbers; quaternions are the squares of others, divided by their
-    lengths, which are of length 1 exactly.
+def values_at_random(model: Model, numbers: Iterator[float], scalars: Scalars) -> Values:
+    """A state of a model, of random numbers; quaternions are the squares of others, divided by
+    their lengths, which are of length 1 exactly.
     """
-    q = [scalars.number(float(next(numbers))) for _ in model.coordinates]
+    q = [scalars.number(next(numbers)) for _ in model.coordinates]
     for w, x, y, z in model.quaternions:
         a, b, c, d = q[w], q[x], q[y], q[z]
         rest = b * b + c * c + d * d
@@ -114,7 +114,7 @@ def values_at_random(model: Model, numbers: Iterator[int], scalars: Scalars) -> 
             two * c / length,
             two * d / length,
         )
-    v = [scalars.number(float(next(numbers))) for _ in model.velocities]
+    v = [scalars.number(next(numbers)) for _ in model.velocities]
     given = {name: scalars.number(x) for name, x in model.defaults.items()}
     inputs = {i.name: scalars.number(i.default) for i in model.inputs}
     return Values(given, inputs, q, v, {}, scalars.number(0.0))

@@ -6,7 +6,7 @@ them, as Gautier and Khalil do ("Direct calculation of minimum set of inertial p
 robots", IEEE Transactions on Robotics and Automation 6, 1990). Rows are those of random states.
 
 Where fixed rotations are rational, as quarter turns are, all is computed in residues modulo a large
-prime, and the rank is exact. Others have 60 digits, of which a relation takes `ZERO`.
+prime, and the rank is exact. Others have 60 digits, and relations that hold but for `ZERO` count.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,10 +31,8 @@ from eomgen.scalars.residues import Residue, Residues
 SEED = 1
 MORE = 2
 """States beyond those that have as many rows as there are columns."""
-LARGEST = 1000
-"""Random whole numbers are up to this one in 60 digits, and as long as the prime in residues."""
-ZERO = 1e-30
-"""Of numbers of 60 digits, relative to the largest of their column: what is smaller is 0."""
+ZERO = 1e-9
+"""Of numbers of 60 digits what is smaller is 0: files of robots give right angles as doubles."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def _found(model: Model, scalars: Scalars, *, exact: bool) -> BaseParameters:
         dynamics = Dynamics(model, values_at_random(model, numbers, scalars), scalars, "own")
         every = every or inertial_parameters(model, dynamics)
         more -= len(rows) >= len(every)
-        vd = [scalars.number(float(next(numbers))) for _ in model.velocities]
+        vd = [scalars.number(next(numbers)) for _ in model.velocities]
         columns = regressor(dynamics, vd, every)
         rows += [list(row) for row in zip(*columns, strict=True)]
         if not rows:
@@ -101,11 +99,11 @@ def _found(model: Model, scalars: Scalars, *, exact: bool) -> BaseParameters:
     return BaseParameters(every, groups, none, exact)
 
 
-def _numbers(exact: bool) -> Iterator[int]:
-    """Random whole numbers, which doubles hold."""
+def _numbers(exact: bool) -> Iterator[float]:
+    """Random doubles: large whole numbers for residues, else numbers near 1."""
     random = Random(SEED)
     while True:
-        yield random.randrange(1, 2**53 if exact else LARGEST)
+        yield float(random.randrange(1, 2**53)) if exact else random.uniform(-2.0, 2.0)
 
 
 def _reduce(rows: list[list[Any]], columns: int, exact: bool) -> list[int]:

@@ -24,10 +24,12 @@ from eomgen.dynamics.regressor import ROTOR
 from eomgen.fitting.base_parameters import base_parameters
 
 
-def theirs(path: Path, floating: bool) -> tuple[int, int, float, float]:
+def theirs(path: Path, floating: bool, locked: list[str]) -> tuple[int, int, float, float]:
     """The rank by the largest gap of singular values below 1e-8, the columns, and its two ends."""
     root = [pin.JointModelFreeFlyer()] if floating else []
     model = pin.buildModelFromUrdf(str(path), *root)
+    held = [model.getJointId(name) for name in locked if model.existJointName(name)]
+    model = pin.buildReducedModel(model, held, pin.neutral(model)) if held else model
     data = model.createData()
     rng = np.random.default_rng(1)
     rows: list[Any] = []
@@ -46,13 +48,16 @@ def theirs(path: Path, floating: bool) -> tuple[int, int, float, float]:
     return rank, columns, sizes[rank - 1], sizes[rank] if rank < len(sizes) else 0.0
 
 
-def ours(path: Path, allowed: list[Path], floating: bool) -> tuple[int, int, bool]:
-    """Base parameters, all, and whether they are exact, without rotors."""
+def ours(path: Path, allowed: list[Path], floating: bool) -> tuple[int, int, bool, list[str]]:
+    """Base parameters, all, and whether they are exact, without rotors; and the joints that are
+    held since they carry no mass.
+    """
     tables = dict(eomgen.import_robot(path, allow=allowed, floating=floating).tables)
     tables.pop("constraints", None)  # of joints that mimic others, which Pinocchio moves freely
     found = base_parameters(eomgen.check(tables))
     own = sum(one.what != ROTOR for one in found.groups)
-    return own, sum(one.what != ROTOR for one in found.every), found.exact
+    every = sum(one.what != ROTOR for one in found.every)
+    return own, every, found.exact, list(tables.get("locked", {}))
 
 
 def main() -> None:
@@ -66,14 +71,14 @@ def main() -> None:
         begun, floating = time.process_time(), False
         try:
             try:
-                rank, every, exact = ours(path, given.allow, floating)
+                rank, every, exact, locked = ours(path, given.allow, floating)
             except EomgenError as error:
                 if "nothing can move" not in str(error):
                     raise
                 floating = True
-                rank, every, exact = ours(path, given.allow, floating)
+                rank, every, exact, locked = ours(path, given.allow, floating)
             own = time.process_time() - begun
-            other, _, last, first = theirs(path, floating)
+            other, _, last, first = theirs(path, floating, locked)
         except (EomgenError, ValueError, RuntimeError) as error:
             print(f"{path.name:32} {str(error).splitlines()[0][:100]}", flush=True)
             continue
