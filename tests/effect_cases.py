@@ -206,6 +206,9 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
     ("contact", "shapes and shapes",
      f'law = "spring_damper"; against = "each_other"; stiffness = 90.0; shapes = {{ {SHAPES}, '
      'ball = { body = "c", radius = 0.9 } }; except_pairs = [["b", "c"]]', CONSERVES),
+    ("contact", "some shapes and shapes",
+     f'law = "spring_damper"; against = "each_other"; stiffness = 90.0; shapes = {{ {SHAPES}, '
+     'ball = { body = "c", radius = 0.9 } }; pairs = [["rod", "ball"]]', CONSERVES),
     ("contact", "heights",
      f'law = "spring_damper"; against = "heights"; height = "0.4 + 0.3*sin(2*x)"; stiffness = 90; '
      f'{LOSSES}shapes = {{ {SHAPES} }}', damped("friction")),

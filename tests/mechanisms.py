@@ -83,7 +83,8 @@ def _compiled(scene: Scene, form: str) -> Compiled:
     if form == "velocity":
         equations = derive(model)
     else:  # the same equations, to be written in other states
-        equations = replace(compiled(scene).equations, model=model)
+        found = compiled(scene).equations
+        equations = replace(found, kinematics=replace(found.kinematics, model=model))
     system = optimised(from_equations(equations))
     assert system.route == "closed"
     source = python_module(system)

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError
 from eomgen.base.frozen import Frozen
-from eomgen.run.poses import places_of, world_points
 from eomgen.scene.look import BARE, Shape, numbers
 from eomgen.show.framing import Framing, View
 from eomgen.show.picture import Picture
+from eomgen.tables.poses import places_of, world_points
 
 Array = NDArray[np.float64]
 

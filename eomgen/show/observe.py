@@ -8,7 +8,6 @@ import numpy as np
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
-from eomgen.run.poses import world_points
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
@@ -21,6 +20,7 @@ from eomgen.show.motion import Anchor, Motion, Plane
 from eomgen.show.of_run import fixed_points, leading_bodies, spread, with_run
 from eomgen.show.picture import Picture, picture_of
 from eomgen.show.view import eye_axes
+from eomgen.tables.poses import world_points
 
 
 class _Joint(Protocol):

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant, Formula
 from eomgen.language.rewriting import constant
 from eomgen.model.model import Model
-from eomgen.run.poses import places_of, world_points
 from eomgen.scene.effects.elements import (
     Attraction,
     Element,
@@ -22,6 +21,7 @@ from eomgen.scene.effects.elements import (
 from eomgen.scene.look import number, numbers
 from eomgen.show.arrows import field_arrows, ground_lines, region_of, wind_at
 from eomgen.show.picture import Picture
+from eomgen.tables.poses import places_of, world_points
 
 Array = NDArray[np.float64]
 

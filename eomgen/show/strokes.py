@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant, Formula
-from eomgen.run.poses import world_points
 from eomgen.scene.effects.elements import Attachment
 from eomgen.scene.look import number, numbers
 from eomgen.show.marks import Along, Arrows, Between, Facing, Mark, Turned, marks_of
 from eomgen.show.picture import Picture
 from eomgen.show.symbols import Line, numbers_of
+from eomgen.tables.poses import world_points
 
 Array = NDArray[np.float64]
 TAUT = 1e-3

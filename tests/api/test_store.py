@@ -582,22 +582,23 @@ def test_a_warm_run_computes_only_what_is_asked_for(
     """No view of a picture, no module compiled by Python, and one digest of the model."""
     asked: dict[str, Any] = {"t_end": 0.1, "backend": "numpy"}
     before = eomgen.simulate("cart_pole", **asked)
-    compiling, printing, counts = builtins.compile, Model.__repr__, Counter[str]()
+    digest, counts = Model.__dict__["digest"], Counter[str]()
+    compiling, digesting = builtins.compile, digest.func
 
     def compiles(source: Any, *given: Any, **named: Any) -> Any:
         counts["compile"] += "def derivative(" in str(source)
         return compiling(source, *given, **named)
 
-    def prints(model: Model) -> str:
+    def digests(model: Model) -> bytes:
         counts["digest"] += 1
-        return printing(model)
+        return bytes(digesting(model))
 
     def frames(*_: Any) -> None:
         counts["view"] += 1
         raise AssertionError("asked for")
 
     monkeypatch.setattr(builtins, "compile", compiles)
-    monkeypatch.setattr(Model, "__repr__", prints)
+    monkeypatch.setattr(digest, "func", digests)
     monkeypatch.setattr("eomgen.show.framing.bounds_of", frames)
     monkeypatch.setattr("eomgen.show.figure.draw_motion", DRAWN)
     run = eomgen.simulate("cart_pole", **asked)

@@ -77,6 +77,8 @@ TABLES: dict[str, dict[str, str]] = {
     "contact ball": {"bodies": '"all"', "law": '"hunt_crossley"', "against": '"ball"',
                      "radii": "{{ boom = 1 }}", "radius": "1", "other_radius": "1",
                      "other_at": "{v}", "stiffness": "1", "dissipation": "1"},
+    "contact hills": {"body": '"boom"', "law": '"spring_damper"', "against": '"heights"',
+                      "height": "1", "radius": "1", "stiffness": "1"},
     "contact rigid": {"body": '"boom"', "law": '"impact"', "restitution": "1"},
     "driven": {"joint": '"rail"', "coordinate": '"sin(t)"'},
     "motor": {"joint": '"rail"', "torque": "1"},
@@ -88,12 +90,12 @@ TABLES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """Of every effect good tables, which together give every field that holds a quantity or a name."""
 OF_ANY_SIGN = set(
-    "contact.at contact.offset contact.other_at contact.restitution controller.torques drag.at "
-    "drag.wind driven.coordinate external_force.at external_force.force external_torque.torque "
-    "field.at field.center field.force gravity.g joint_spring.law joint_spring.rest "
-    "joint_stop.high joint_stop.low joint_stop.restitution motor.torque pairwise.law pd.target "
-    "pd.target_rate pid.target pid.target_rate point_gravity.at spring.at_1 spring.at_2 spring.law "
-    "spring.rest_length".split()
+    "contact.at contact.height contact.offset contact.other_at contact.restitution "
+    "controller.torques drag.at drag.wind driven.coordinate external_force.at "
+    "external_force.force external_torque.torque field.at field.center field.force gravity.g "
+    "joint_spring.law joint_spring.rest joint_stop.high joint_stop.low joint_stop.restitution "
+    "motor.torque pairwise.law pd.target pd.target_rate pid.target pid.target_rate "
+    "point_gravity.at spring.at_1 spring.at_2 spring.law spring.rest_length".split()
 )
 """Forces, places, laws and targets; a restitution has two bounds, and tests of its own. All else,
 stiffness, damping, drag, gains, is not negative.

@@ -311,7 +311,9 @@ def test_what_is_nearer_hides_what_is_farther() -> None:
 )
 def test_the_floor_is_under_the_motion(lift: float, z: float) -> None:
     motion = sliding()
-    motion.poses[..., 2, 3] += lift
+    poses = motion.poses.copy()
+    poses[..., 2, 3] += lift
+    motion = replace(motion, poses=poses)
     if lift > 1:
         motion = replace(motion, framing=View(center=(0.0, 0.0, 51.0), height=3.0))
     floor = floor_under(motion, cast_of(solids(motion.shapes, 3.0, 1000)))
@@ -414,7 +416,9 @@ def test_odd_motions_in_space_are_drawn(tmp_path: Path, changes: dict[str, Any])
 
 def test_motions_are_thinned_and_checked() -> None:
     motion = sliding(31)
-    motion.poses[3, 1, 2, 1] = np.nan
+    poses = motion.poses.copy()
+    poses[3, 1, 2, 1] = np.nan
+    motion = replace(motion, poses=poses)
     assert len(thinned(motion).t) == 30 and thinned(motion, 10).poses.shape == (10, 2, 3, 4)
     with pytest.raises(AssertionError):
         sliding(anchors=((1, 0.0, 0.0),))

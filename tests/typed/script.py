@@ -104,6 +104,10 @@ def of_others(robot: Path) -> None:
     """Robot files, and other programs if they are there."""
     tables = eomgen.import_robot(robot).tables
     print(sorted(tables))
+    log = {"t": np.linspace(0.0, 1.0, 11), "theta": np.full(11, 0.1)}
+    fit: eomgen.Fit = eomgen.fit("pendulum", log, ["theta"])
+    value: float = fit.values["theta"]
+    print(value, fit.rank)
     print(eomgen.casadi_functions("pendulum"))
     print(eomgen.state_space("cart_pole", outputs=["theta"]))
     print(eomgen.nonlinear_system("cart_pole"))

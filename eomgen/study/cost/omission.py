@@ -18,10 +18,10 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
-from eomgen.run.poses import places_of, rotations_of
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
+from eomgen.tables.poses import places_of, rotations_of
 
 SMALL = 0.01
 """A motion counts as changed beyond this part of the extent."""

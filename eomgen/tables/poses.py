@@ -1,8 +1,9 @@
 """What the output `body_poses` says: positions and rotations of bodies at the rows of a run."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eomgen.run.problem import FloatArray
+FloatArray = NDArray[np.float64]
 
 
 def places_of(poses: FloatArray) -> FloatArray:
