@@ -123,10 +123,15 @@ def test_a_lesson_has_all_its_parts(name: str) -> None:
 
 
 def test_pages_are_linked() -> None:
-    """Nothing that a page points to inside the project is missing."""
+    """Nothing that a page points to inside the project is missing, and each page is on the site."""
+    listed = {DOCS / "index.md"}
     for page in [*DOCS.glob("*.md"), *DOCS.glob("*/*.md")]:
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+            lines = [line for line in tree.splitlines() if line and not line.startswith(":")]
+            listed |= {page.parent / f"{line}.md" for line in lines}
         for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+    assert {*DOCS.glob("*.md"), *DOCS.glob("*/*.md")} == listed
 
 
 def tables() -> list[type[Table]]:
