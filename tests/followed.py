@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from equation_numbers import Numbers, array, define, follow, number
 
 from eomgen.derivation.acting import used_bodies
 from eomgen.derivation.articulated import recursive_steps
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect, derived_effects
-from eomgen.derivation.evaluate import Numbers, array, define, follow, number
 from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.own_names import own_name
 from eomgen.derivation.poses import poses

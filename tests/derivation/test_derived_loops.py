@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import some
+from equation_numbers import Numbers, array, define, number
 from followed import Instant, instant
 
 import eomgen
 from eomgen.derivation.constraints import DerivedConstraint, derived_constraints
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.evaluate import Numbers, array, define, number
 from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.linkage import linkage_of
 from eomgen.derivation.loops import by_independent_velocities, elimination_steps

@@ -15,6 +15,7 @@ import sympy as sp
 from campaign import some
 from driven_trees import given
 from effect_cases import CASES, TRIED, Case
+from equation_numbers import array, define, number
 from followed import follow_effects, follow_recursion, instant
 
 import eomgen
@@ -22,7 +23,6 @@ from eomgen.api.derivation import Derivation
 from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import derived_effects
-from eomgen.derivation.evaluate import array, define, number
 from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.impacts import impact_steps
 from eomgen.derivation.prescribed import prescribed_motion
@@ -609,3 +609,24 @@ def test_labels_of_sketches_are_clear(scene: str) -> None:
                 points = np.vstack([np.linspace(a, b, 40) for a, b in pairwise(ends)])
                 away = np.abs(points - one.at)
                 assert not (away.max(axis=1) < 3).any(), (drawing.title, one.text)
+
+
+def test_forces_and_torques_in_body_axes() -> None:
+    """The accelerations of a derivation are the module's, whatever way the body lies."""
+    push = {"body": "a", "axes": "body"}
+    torque = {**push, "type": "external_torque", "name": "turn", "torque": [1, 2, 3]}
+    force = {**push, "type": "external_force", "name": "push", "force": [1, -2, 3]}
+    pushed = {
+        "name": "pushed",
+        "dimensions": 3,
+        "bodies": [{"name": "a", "mass": 2.0, "inertia_com": [0.3, 0.4, 0.5]}],
+        "joints": [{"name": "flight", "type": "free", "child": "a"}],
+        "effects": [torque, {**force, "at": [0.1, 0.2, 0.3]}],
+    }
+    found, module = eomgen.derive(pushed), eomgen.load(eomgen.generate(pushed))
+    y = np.random.default_rng(5).normal(size=13)
+    y[3:7] /= np.linalg.norm(y[3:7])
+    known = {**dict(zip(module.STATES, y, strict=True)), **module.PARAMETERS}
+    at = {symbol: known[name] for name, symbol in found.symbols.items() if name in known}
+    accelerations = [float(value.subs(at)) for value in found.solution.values()]
+    np.testing.assert_allclose(accelerations, module.derivative(0.0, y)[7:], atol=1e-12)

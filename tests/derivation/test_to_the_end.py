@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import FULL, some
+from equation_numbers import number
 from followed import LookedUp, instant
 
 import eomgen
 from eomgen.api.derivation import Derivation
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.evaluate import number
 from eomgen.derivation.identity import identical
 from eomgen.derivation.symbols import names_of_scene
 from eomgen.dynamics.start.assembly import assembled
