@@ -11,14 +11,17 @@ IMPORTED = """
 import os, runpy, sys
 given = list(sys.path)
 for path in sys.argv[1:]:
-    sys.path.insert(0, os.path.dirname(path))  # as for a script
+    folder = os.path.dirname(path)
+    tests = os.path.join(os.path.dirname(folder), "")
+    sys.path.insert(0, folder)  # as for a script
     try:
         runpy.run_path(path, run_name="imported")
     except ModuleNotFoundError as error:  # an extra may be missing
         print(path, error.name)
     sys.path[:] = given
     for name, module in list(sys.modules.items()):
-        if "/tests/" in str(getattr(module, "__file__", "")):
+        # A checkout may be in a folder of that name, with its environment inside.
+        if str(getattr(module, "__file__", "")).startswith(tests):
             del sys.modules[name]
 """
 
