@@ -51,13 +51,7 @@ class Accuracy(Displayed):
     left_out    methods whose finer runs were not made, for lack of time
     """
 
-    shown = (
-        "t_end",
-        "methods",
-        "works",
-        "left_out",
-        "reference",
-    )
+    shown = ("t_end", "methods", "works", "left_out", "reference")
 
     works: "tuple[Work, ...]"
     reference: "Reference"

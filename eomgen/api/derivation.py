@@ -34,10 +34,7 @@ class Derivation(Displayed):
     `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
     """
 
-    shown = (
-        "title",
-        "steps",
-    )
+    shown = ("title", "steps")
 
     model: Model
     exposition: "Exposition"

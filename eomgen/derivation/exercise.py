@@ -63,10 +63,7 @@ class Exercise(Displayed):
     not as the scene has them.
     """
 
-    shown = (
-        "questions",
-        "known",
-    )
+    shown = ("questions", "known")
 
     model: Model
     questions: tuple[Question, ...]

@@ -28,10 +28,7 @@ class Design(Frozen, Displayed):
     axes    of a grid, the values along each axis, the last of which varies fastest; else empty
     """
 
-    shown = (
-        "names",
-        "values",
-    )
+    shown = ("names", "values")
 
     names: tuple[str, ...]
     values: FloatArray

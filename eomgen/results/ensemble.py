@@ -46,16 +46,7 @@ class Ensemble(Frozen, Displayed):
     units      units by name, as far as known
     """
 
-    shown = (
-        "scene",
-        "design",
-        "states",
-        "ended",
-        "t",
-        "final",
-        "times",
-        "outputs",
-    )
+    shown = ("scene", "design", "states", "ended", "t", "final", "times", "outputs")
 
     scene: str
     design: Design

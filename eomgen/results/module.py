@@ -29,12 +29,7 @@ class Module(Frozen, Displayed):
                  if at least ten
     """
 
-    shown = (
-        "backend",
-        "explanation",
-        "notices",
-        "digits",
-    )
+    shown = ("backend", "explanation", "notices", "digits")
 
     name: str
     source: str

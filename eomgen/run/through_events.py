@@ -69,4 +69,4 @@ def rows_through_events(wanted: Wanted) -> FloatArray | None:
         only_whole=False,
         constrained=None,
     )
-    return through(WholeRun(stretch, NEAR * asked.t_end, CHECK_STIFFNESS))
+    return through(WholeRun(stretch, NEAR * asked.span, CHECK_STIFFNESS))

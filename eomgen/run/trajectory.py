@@ -109,15 +109,7 @@ class Trajectory(Frozen, Displayed):
     Raises `ValueError` if the values are inconsistent.
     """
 
-    shown = (
-        "integrator",
-        "states",
-        "t",
-        "y",
-        "finished",
-        "message",
-        "counts",
-    )
+    shown = ("integrator", "states", "t", "y", "finished", "message", "counts")
 
     name: str
     states: tuple[str, ...]

@@ -105,12 +105,7 @@ class Arithmetic(Displayed):
     which the two solutions in 60 digits agree.
     """
 
-    shown = (
-        "taken",
-        "agreed",
-        "samples",
-        "solvers",
-    )
+    shown = ("taken", "agreed", "samples", "solvers")
 
     name: str
     taken: str

@@ -74,14 +74,7 @@ class Bill(Frozen, Displayed):
     ended the motions, of which there is then none, or is "".
     """
 
-    shown = (
-        "route",
-        "operations",
-        "items",
-        "routes",
-        "extent",
-        "stopped",
-    )
+    shown = ("route", "operations", "items", "routes", "extent", "stopped")
 
     name: str
     route: str

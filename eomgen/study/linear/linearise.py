@@ -41,14 +41,7 @@ class Linearisation(Frozen, Displayed):
                          without constraints
     """
 
-    shown = (
-        "state_names",
-        "input_names",
-        "y",
-        "u",
-        "A",
-        "B",
-    )
+    shown = ("state_names", "input_names", "y", "u", "A", "B")
 
     A: FloatArray
     B: FloatArray

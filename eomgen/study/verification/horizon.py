@@ -35,10 +35,7 @@ class Horizon(Displayed):
     origin how that run was made
     """
 
-    shown = (
-        "words",
-        "origin",
-    )
+    shown = ("words", "origin")
 
     time: float | None
     t_end: float

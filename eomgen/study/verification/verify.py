@@ -74,16 +74,7 @@ class Verified(Frozen, Displayed):
     stopped   how far an interrupt let it come; "" if it is complete
     """
 
-    shown = (
-        "taken",
-        "judged",
-        "better",
-        "missed",
-        "checks",
-        "left_out",
-        "stopped",
-        "notes",
-    )
+    shown = ("taken", "judged", "better", "missed", "checks", "left_out", "stopped", "notes")
 
     name: str
     taken: str
