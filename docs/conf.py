@@ -1,5 +1,12 @@
 """The site: `sphinx-build docs out/site`; `python tools/site.py` adds the gallery and versions."""
 
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tools"))
+import entry_pages
+
 from eomgen.base.version import __version__
 
 project = "eomgen"
@@ -13,3 +20,17 @@ suppress_warnings = ["myst.xref_missing"]
 exclude_patterns = ["out"]
 # The schema of scenes, at a fixed address for editors.
 html_extra_path = ["../eomgen/scenes/scene.schema.json"]
+html_static_path = ["../templates/derivation/formulas.css"]
+html_css_files = ["formulas.css"]
+
+
+def setup(app: Any) -> None:
+    """Formulas of the reference are drawn by the browser, without a script from elsewhere."""
+    app.connect("source-read", with_formulas)
+
+
+def with_formulas(_: Any, page: str, source: list[str]) -> None:
+    """The text of a page of the reference with MathML in place of TeX."""
+    folder, _, name = page.rpartition("/")
+    if folder == "reference" and name in entry_pages.ENTRIES:
+        source[0] = entry_pages.entry_page(name, entry_pages.as_mathml)

@@ -1,8 +1,8 @@
 """Writes the pages that are made from the program itself: `python tools/pages.py`.
 
 docs/commands.md from the command line's own help, docs/functions.md from the docstrings of the
-public functions and classes, docs/reference and eomgen/entries.pyi from the tables of scenes, the
-diagrams of docs/course from their scenes.
+public functions and classes, docs/reference and eomgen/entries.pyi from the tables of scenes (see
+`entry_pages.py`), the diagrams of docs/course from their scenes.
 """
 
 import argparse
@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from types import MethodType
 from typing import Any
+
+from entry_pages import ENTRIES, entry_page
 
 import eomgen
 from eomgen.commands.main import parsers
@@ -119,7 +121,8 @@ def _call(function: Callable[..., Any]) -> str:
 
 
 def _of_reference(name: str) -> str:
-    return reference_pages()[name]
+    entry = name.removesuffix(".md")
+    return entry_page(entry) if entry in ENTRIES else reference_pages()[name]
 
 
 def reference_index() -> str:

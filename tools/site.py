@@ -1,15 +1,16 @@
 """Build the site for a host: python tools/site.py [OUT] [SCENE ...]
 
 OUT (out/site) gets a folder for this version, with the pages, their inventory `objects.inv`, the
-live gallery of the scenes (all built-in ones) and the live pages of the course, and an `index.html`
-that leads to all versions that are there, the newest first. Copy OUT to any host of static files.
+live gallery of the scenes (all built-in ones), the live pages of the course and of the reference,
+and an `index.html` that leads to all versions that are there, the newest first. Copy OUT to any
+host of static files.
 `pip install -e '.[docs]'` brings what it needs.
 """
 
 import re
 import subprocess
 import sys
-import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -38,25 +39,24 @@ def main() -> None:
     scenes = ["--scene", *sys.argv[2:]] if len(sys.argv) > 2 else []
     gallery = [*python, "eomgen", "gallery", "-o", folder / "gallery", "--force", *scenes]
     subprocess.run(gallery, cwd=ROOT, check=True)
-    course(folder / "course" / "live", python)
+    import entry_pages
+    import pages
+
+    own = [name for name in pages.LESSONS if name not in pages.BUILT_IN_LESSONS]
+    live(folder / "course" / "live", map(pages.lesson_scene, own))
+    live(folder / "reference" / "live", map(entry_pages.scene_text, entry_pages.ENTRIES))
     known = [path.parent.name for path in out.glob("*/objects.inv")]
     known.sort(key=lambda name: [int(part) for part in re.findall(r"\d+", name)], reverse=True)
     items = "\n".join(f'<li><a href="{name}/index.html">{name}</a></li>' for name in known)
     (out / "index.html").write_text(PAGE.format(newest=known[0], items=items), "utf-8")
 
 
-def course(folder: Path, python: list[str]) -> None:
-    """The live pages of the lessons whose scenes are written there."""
-    import pages
+def live(folder: Path, scenes: Iterable[str]) -> None:
+    """The live pages of scenes that are given as text."""
+    import eomgen
 
-    with tempfile.TemporaryDirectory() as place:
-        files = [Path(place, f"{name}.toml") for name in pages.LESSONS]
-        for file in files:
-            if file.stem not in pages.BUILT_IN_LESSONS:
-                file.write_text(pages.lesson_scene(file.stem), "utf-8")
-        own = [file for file in files if file.exists()]
-        gallery = [*python, "eomgen", "gallery", "-o", folder, "--force", "--scene", *own]
-        subprocess.run(gallery, cwd=ROOT, check=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    eomgen.gallery(folder, list(scenes), force=True)
 
 
 if __name__ == "__main__":
