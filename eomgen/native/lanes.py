@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eomgen.codegen.backends import c_lanes
 from eomgen.codegen.interface import Interface
 from eomgen.native.compiler import find_compiler
-from eomgen.native.library import compiled_library
+from eomgen.native.library import address, compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
 from eomgen.program.program import Program
 from eomgen.run.integrators.fixed_step import Grid
@@ -181,7 +181,7 @@ def columns_of(*arrays: FloatArray) -> list[Columns]:
     must outlive the call.
     """
     assert all(array.flags.c_contiguous and array.dtype == np.float64 for array in arrays)
-    return [Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
+    return [Columns(address(array), array.shape[1] > 1) for array in arrays]
 
 
 def _usual(p: FloatArray, k: FloatArray) -> NDArray[np.bool_]:

@@ -1,9 +1,9 @@
 """A compiled module: the functions of a generated Python module, computed by C kernels.
 
 A kernel reports whether the floating-point unit raised an overflow, a division by zero or an
-invalid operation. If not, its result has the bits that the Python module would return. In all other
-cases the Python module computes the result or raises its error. It also checks parameters that are
-new.
+invalid operation. If not, its result has the bits that the Python module would return; columns of
+the derivative have those with the sines and cosines of `eomgen.run.sine`. In all other cases the
+Python module computes the result or raises its error. It also checks parameters that are new.
 """
 
 import ctypes
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.native.beside import BESIDE, function, reader_of
+from eomgen.native.library import address
 from eomgen.run.module import given_values
 from eomgen.run.problem import FloatArray
 
@@ -101,7 +102,7 @@ class Kernels:
         buffer = _REAL * math.prod(shape)
         one = self.library[f"checked_{name}"]
         one.argtypes = [_REAL, *[_POINTER] * 5]
-        columns = self._columns(name, shape)
+        columns = self._columns(name, shape) if math.prod(shape) else python
 
         def function(t: float, y: Any, p: Any = None, u: Any = None) -> Any:
             usual = y.__class__ is np.ndarray and y.dtype is _FLOAT and y.shape[:1] == (states,)
@@ -143,9 +144,9 @@ class Kernels:
 
     def _columns(self, name: str, shape: tuple[int, ...]) -> Callable[..., FloatArray]:
         """The function of an output for columns of states."""
-        python, size = getattr(self.module, name), math.prod(shape)
+        python = getattr(self.module, name)
         many = self.library[f"columns_{name}"]
-        many.argtypes = [_LONG, _REAL, *[_POINTER] * 3, ctypes.c_int, *[_POINTER] * 2]
+        many.argtypes = [_LONG, _REAL, *[_POINTER] * 3, ctypes.c_int, _POINTER]
         own, none = self.held(None), self.none.ctypes.data
 
         def columns(t: float, y: FloatArray, p: Any, u: Any) -> FloatArray:
@@ -154,16 +155,13 @@ class Kernels:
             if k is None or given is None:
                 return np.asarray(python(t, y, p, u))
             y, given = np.ascontiguousarray(y), np.ascontiguousarray(given)
-            pushes = none if u is None else given.ctypes.data
-            result, sound = np.empty((size, count)), np.empty(count, dtype=np.int8)
-            into = (result.ctypes.data, sound.ctypes.data)
-            each = given.ndim == 2
-            many(count, t, y.ctypes.data, k, pushes, each, *into)
-            if not sound.all():
-                left = np.flatnonzero(sound == 0)
+            pushes, each = none if u is None else address(given), given.ndim == 2
+            result = np.empty((*shape, count))
+            if not many(count, t, address(y), k, pushes, each, address(result)):
+                left = np.flatnonzero(np.isnan(result.reshape(-1, count)[0]))
                 u = given[:, left] if each else u
-                result[:, left] = python(t, y[:, left], p, u).reshape(size, len(left))
-            return result.reshape(*shape, count)
+                result[..., left] = python(t, y[:, left], p, u)
+            return result
 
         return columns
 

@@ -22,7 +22,7 @@ from eomgen.native import contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
 from eomgen.native.compiler import NOT_JOINED, find_compiler
 from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
-from eomgen.native.library import compiled_library
+from eomgen.native.library import address, compiled_library
 from eomgen.native.mechanism import Given, Mechanism, mechanism
 from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.ordering import ordered
@@ -42,9 +42,8 @@ _POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 Limits = tuple[Sequence[float], Sequence[float]]
 """Of rigid contacts: the sizes of their gaps, and the speeds below which they do not bounce, in
 these; negative if not given."""
-FEW, SMALL = 16, 100
-"""Below this number of states, two vectors of each are stepped together; below this number of
-operations, the derivative is a part of each stage."""
+FEW = 16
+"""Below this number of states, two vectors of each are stepped together."""
 
 
 def sources(
@@ -62,7 +61,6 @@ def sources(
     timed = any(step.value == TIME for step in program.steps if step.operation == "input")
     alone = method in equal_steps.LEAPFROGS or timed or interface.contacts
     together = 2 if states < FEW and not alone else 1
-    (derivative,) = (f["operations"] for f in context["kernels"] if f["name"] == "derivative")
     parts = method in ("leapfrog_4", "leapfrog_6")
     call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS[method]
     contact_steps = (*CONTACT_STEPS, ("add_compensated", {}))
@@ -80,7 +78,6 @@ def sources(
         "positions": [i + n * states for n in range(together) for i in own["positions"]],
         "others": [i + n * states for n in range(together) for i in own["others"]],
         "together": together,
-        "how": "INLINE " if derivative < SMALL else "static ",
         "call": call,
         "part": equal_steps.CALLS["leapfrog"] if parts else "",
     }
@@ -185,10 +182,10 @@ class CompiledSteps(Lanes):
             None if self._rates is None else self._rates.ctypes.data,
             keeps and keeps.onto,
             *(given.t, states, given.k, given.u, given.first or states),
-            None if again is None else again.ctypes.data,
-            out.ctypes.data,
-            None if lost is None else lost.ctypes.data,
-            sound.ctypes.data,
+            None if again is None else address(again),
+            address(out),
+            None if lost is None else address(lost),
+            address(sound),
         )
         self._call(ctypes.byref(call), n)
         return sound

@@ -122,7 +122,7 @@ def derivatives(rounds: int) -> None:
         theirs, found, given = columns_of_pinocchio(peer, y, rng)
         written, again, _ = peer_casadi.columns(peer, *given)
         times = paired(rounds, ours, vectors, waiting, theirs, *written, warm=True)
-        assert np.array_equal(rates, rows.T)
+        assert np.allclose(rates, rows.T, rtol=1e-9, atol=1e-9 * np.abs(rates).max())
         assert np.abs(again - found).max() < 1e-9 * np.abs(found).max()
         if is_same(peer, y):
             worst = np.abs(rates[peer.nq :] - found).max() / np.abs(found).max()
@@ -181,17 +181,14 @@ def is_same(peer: Any, y: np.ndarray) -> bool:
 
 def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[], None], Any]:
     """A call of our kernel for columns of states, and where it puts the derivatives."""
-    out, sound = np.empty_like(y), np.empty(y.shape[1], np.int8)
+    out = np.empty_like(y)
     constants, inputs = Kernels(module, made).held(None), np.zeros(max(1, len(module.INPUTS)))
     call, pointer = made.columns_derivative, ctypes.c_void_p
-    call.argtypes = (
-        *(ctypes.c_long, ctypes.c_double, *[pointer] * 3, ctypes.c_int, *[pointer] * 2),
-    )
+    call.argtypes = (ctypes.c_long, ctypes.c_double, *[pointer] * 3, ctypes.c_int, pointer)
     given = (y.ctypes.data, constants, inputs.ctypes.data, 0)
 
     def compute(kept: Any = inputs) -> None:
-        call(y.shape[1], 0.0, *given, out.ctypes.data, sound.ctypes.data)
-        assert sound[0]
+        assert call(y.shape[1], 0.0, *given, out.ctypes.data)
 
     return compute, out
 

@@ -17,7 +17,7 @@ from eomgen.api.given import check, read
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.model.elaborate import in_order
-from eomgen.native import compiler, lanes
+from eomgen.native import lanes
 from eomgen.native.lanes import Lanes
 from eomgen.native.library import compiled_library
 from eomgen.run.integrators.fixed_step import Grid
@@ -40,15 +40,6 @@ void both(const double *x, double *sine, double *cosine) {
     V v, s, c;
     memcpy(&v, x, sizeof v);
     sine_and_cosine(v, &s, &c);
-    memcpy(sine, &s, sizeof s);
-    memcpy(cosine, &c, sizeof c);
-}
-"""
-ALONE = """
-void alone(const double *x, double *sine, double *cosine) {
-    V v, s, c;
-    memcpy(&v, x, sizeof v);
-    s = sin_v(v), c = cos_v(v);
     memcpy(sine, &s, sizeof s);
     memcpy(cosine, &c, sizeof c);
 }
@@ -120,30 +111,6 @@ def test_plain_sine_and_cosine_have_the_bits_of_numpys() -> None:
     found = sine_and_cosine(x, usable()[-1], "-DPLAIN")
     assert found.tobytes() == np.array([sine(x), cosine(x)]).tobytes()
     assert np.isnan([sine(math.inf), cosine(-math.inf), sine([[math.nan]])[0, 0]]).all()
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("width", WIDTHS)
-def test_sines_of_columns_have_the_bits_of_the_library(width: int) -> None:
-    """Of both of an angle, and of one alone, over the whole range of doubles."""
-    if width > lanes.width():
-        pytest.skip("this processor has no such registers")
-    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH]}
-    texts = {
-        "vector.c": render(c.TEMPLATES, "vector.c.jinja", each)
-        + render(c.TEMPLATES, "rounded_sine.c.jinja", {}),
-        "both.c": "#include <math.h>\n" + WRAPPER + ALONE,
-    }
-    flags = (f"-DWIDTH={width}", *lanes.FLAGS[width], compiler.NOT_JOINED, "-lm")
-    library = compiled_library(f"rounded {texts} {flags}", lambda: texts, "both.c", *flags)
-    x = np.concatenate([angles(), np.random.default_rng(2).uniform(-7.0, 7.0, some(2**16, 2**22))])
-    true = np.array([np.fromiter(map(f, x.tolist()), float) for f in (math.sin, math.cos)])
-    for name in ("both", "alone"):
-        call, found = library[name], np.empty_like(true)
-        call.argtypes = [ctypes.c_void_p] * 3
-        for i in range(0, len(x), width):
-            call(*(row[i:].ctypes.data for row in (x, *found)))
-        assert found.tobytes() == true.tobytes()
 
 
 @pytest.mark.every(2)

@@ -66,8 +66,7 @@ OURS_IN_VECTORS = (
     "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
     "times reduced_angle bits_from sine_and_cosine put loaded lanes_of beside begin unit "
     "suspicious l i fused plus_product product_minus minus_product from_row to_row finite_lanes "
-    "FUSED SUM VECTORS AGAIN APART PLAIN CLEAR TOGETHER SIZE bits_of pair by_library unclear "
-    "rounded slopes"
+    "FUSED SUM VECTORS AGAIN APART PLAIN TOGETHER SIZE slopes"
 )
 VECTORS = replace(
     DIALECT,
@@ -78,6 +77,8 @@ VECTORS = replace(
 """The dialect for vectors of states."""
 EACH = ("tan", "asin", "acos", "atan", "exp", "log", "tanh")
 """Functions of one number that the mathematical library computes for each lane."""
+SMALL = 100
+"""Below this number of operations, a kernel for vectors is a part of what calls it."""
 ANGLE = re.compile(r"(sin|cos)_v?\((\w+)\)")
 """A sine or cosine of a variable; both of one angle are computed together."""
 
@@ -209,6 +210,7 @@ def written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
         "lines": block.lines,
         "results": block.results,
         "operations": kernel.counts["total"],
+        "how": "INLINE " if kernel.counts["total"] < SMALL else "static ",
     }
 
 
