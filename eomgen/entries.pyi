@@ -815,7 +815,7 @@ def Scene(
     name: str,
     title: str = ...,
     about: str = ...,
-    outputs: Literal["all"] | Sequence[Literal["forward_dynamics", "inverse_dynamics", "mass_matrix", "velocity_force", "gravity_force", "bias_force", "applied_force", "kinetic_energy", "potential_energy", "kinetic_slopes", "effect_powers", "coordinates", "velocities", "accelerations", "momentum", "centre_of_mass", "joint_forces", "constraint_forces", "driving_forces", "body_poses", "body_velocities", "point_positions", "point_velocities", "point_jacobians", "input_jacobian", "parameter_jacobian"]] = ...,
+    outputs: Literal["all"] | Sequence[Literal["forward_dynamics", "inverse_dynamics", "mass_matrix", "velocity_force", "gravity_force", "bias_force", "applied_force", "kinetic_energy", "potential_energy", "kinetic_slopes", "effect_powers", "effect_forces", "coordinates", "velocities", "accelerations", "momentum", "centre_of_mass", "joint_forces", "constraint_forces", "driving_forces", "body_poses", "body_velocities", "point_positions", "point_velocities", "point_jacobians", "input_jacobian", "parameter_jacobian"]] = ...,
     form: Literal["velocity", "momentum", "redundant"] = ...,
     parameters: Mapping[str, float | str | Table | Mapping[str, Any]] = ...,
     inputs: Sequence[str | Table | Mapping[str, Any]] = ...,

@@ -98,6 +98,7 @@ COST = {
     "kinetic_energy": {"add": 11, "mul": 19, "sin": 2, "cos": 2, "total": 34, "parameters": 5},
     "potential_energy": {"add": 1, "sub": 2, "mul": 4, "cos": 2, "total": 9, "parameters": 5},
     "effect_powers": {"add": 3, "sub": 3, "mul": 8, "sin": 2, "total": 16, "parameters": 4},
+    "effect_forces": {"add": 1, "sub": 2, "mul": 3, "neg": 1, "sin": 2, "total": 9, "parameters": 7},
     "momentum": {"add": 14, "sub": 2, "mul": 26, "sin": 2, "cos": 2, "total": 46, "parameters": 5},
     "centre_of_mass": {"add": 4, "sub": 2, "mul": 11, "sin": 2, "cos": 2, "total": 21, "parameters": 6},
     "joint_forces": {"add": 8, "sub": 11, "mul": 28, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 35},
@@ -130,77 +131,79 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     if not I_2 >= 0.0:
         return "inertia_com of lower is negative"
     c_2_squared = c_2 * c_2
-    k51 = m_2 * c_2_squared
-    pivot_lower = I_2 + k51
-    k52 = I_1 * I_2
+    k53 = m_2 * c_2_squared
+    pivot_lower = I_2 + k53
+    k54 = I_1 * I_2
     c_1_squared = c_1 * c_1
-    k53 = m_1 * c_1_squared
+    k55 = m_1 * c_1_squared
     l_1_squared = l_1 * l_1
-    k54 = m_2 * I_2
-    k55 = l_1_squared * k54
-    k1 = (m_1 * (k51 * c_1_squared) + (k55 + (I_2 * k53 + (k52 + I_1 * k51)))) / pivot_lower
+    k56 = m_2 * I_2
+    k57 = l_1_squared * k56
+    k1 = (m_1 * (k53 * c_1_squared) + (k57 + (I_2 * k55 + (k54 + I_1 * k53)))) / pivot_lower
     m_2_squared = m_2 * m_2
-    k56 = c_2_squared * l_1_squared
-    k2 = m_2_squared * k56 / pivot_lower
-    k26 = m_2 * l_1
-    k3 = c_2 * k26
+    k58 = c_2_squared * l_1_squared
+    k2 = m_2_squared * k58 / pivot_lower
+    k28 = m_2 * l_1
+    k3 = c_2 * k28
     k19 = m_2 * g
     k4 = c_2 * k19
     k5 = 1.0 / pivot_lower
-    k24 = m_1 * c_1
-    k27 = k26 + k24
-    k6 = g * k27
-    k28 = m_2 * c_2
-    k7 = g * k28
+    k26 = m_1 * c_1
+    k29 = k28 + k26
+    k6 = g * k29
+    k30 = m_2 * c_2
+    k7 = g * k30
     k8 = -k5
     k9 = k2 * 2.0
     k10 = k3 * 2.0
-    k57 = m_2 * l_1_squared
-    k32 = l_1 * c_2
-    k11 = 2.0 * (m_2 * k32)
-    k12 = I_2 + (I_1 + (k53 + (k51 + k57)))
-    k13 = l_1 * k28
+    k59 = m_2 * l_1_squared
+    k34 = l_1 * c_2
+    k11 = 2.0 * (m_2 * k34)
+    k12 = I_2 + (I_1 + (k55 + (k53 + k59)))
+    k13 = l_1 * k30
     k14 = I_1 / 2.0
     k15 = I_2 / 2.0
     k16 = m_1 / 2.0
     k17 = l_1 - c_1
     k18 = m_2 / 2.0
     k20 = c_1 - l_1 - c_1
-    k21 = g * k24
+    k21 = g * k26
     k22 = m_1 * g
     k23 = -k17
-    k58 = m_1 + m_2
-    k25 = 1.0 / k58
-    k29 = -g * k58
-    k30 = -k26
-    k31 = -c_1
-    k59 = m_2 * I_1
-    k60 = m_1 * I_2
-    k61 = m_1 * m_2
-    k62 = c_2_squared * k61
-    k63 = c_1_squared * k62 + (k55 + (c_1_squared * k60 + (k52 + c_2_squared * k59)))
-    k33 = k63 / pivot_lower
-    k34 = pivot_lower * c_1_squared / pivot_lower
-    k64 = c_2_squared * k53 + (I_1 * c_2_squared + I_2 * l_1_squared) - c_2_squared * k33
-    k35 = k64 / pivot_lower
-    k36 = (k56 * (m_2 * 2.0) - c_2_squared * k2) / pivot_lower
-    k37 = c_2_squared * k5 / pivot_lower
-    k38 = -k37
-    k39 = pivot_lower / pivot_lower
-    k40 = (k57 + (I_1 + k53) - k33) / pivot_lower
-    k41 = k2 / pivot_lower
-    k42 = k5 / pivot_lower
-    k43 = -k42
-    k65 = l_1 * 2.0
-    k44 = k54 * k65 / pivot_lower
-    k45 = m_2_squared * (c_2_squared * k65) / pivot_lower
-    k46 = c_1 * 2.0 * (k60 + k62) / pivot_lower
-    k66 = c_2 * 2.0
-    k67 = m_2 * k66
-    k47 = (k59 * k66 + c_1_squared * (k61 * k66) - k33 * k67) / pivot_lower
-    k48 = (m_2_squared * (l_1_squared * k66) - k2 * k67) / pivot_lower
-    k49 = k5 * k67 / pivot_lower
-    k50 = -k49
+    k24 = c_1 * k22
+    k25 = k19 * k20
+    k60 = m_1 + m_2
+    k27 = 1.0 / k60
+    k31 = -g * k60
+    k32 = -k28
+    k33 = -c_1
+    k61 = m_2 * I_1
+    k62 = m_1 * I_2
+    k63 = m_1 * m_2
+    k64 = c_2_squared * k63
+    k65 = c_1_squared * k64 + (k57 + (c_1_squared * k62 + (k54 + c_2_squared * k61)))
+    k35 = k65 / pivot_lower
+    k36 = pivot_lower * c_1_squared / pivot_lower
+    k66 = c_2_squared * k55 + (I_1 * c_2_squared + I_2 * l_1_squared) - c_2_squared * k35
+    k37 = k66 / pivot_lower
+    k38 = (k58 * (m_2 * 2.0) - c_2_squared * k2) / pivot_lower
+    k39 = c_2_squared * k5 / pivot_lower
+    k40 = -k39
+    k41 = pivot_lower / pivot_lower
+    k42 = (k59 + (I_1 + k55) - k35) / pivot_lower
+    k43 = k2 / pivot_lower
+    k44 = k5 / pivot_lower
+    k45 = -k44
+    k67 = l_1 * 2.0
+    k46 = k56 * k67 / pivot_lower
+    k47 = m_2_squared * (c_2_squared * k67) / pivot_lower
+    k48 = c_1 * 2.0 * (k62 + k64) / pivot_lower
+    k68 = c_2 * 2.0
+    k69 = m_2 * k68
+    k49 = (k61 * k68 + c_1_squared * (k63 * k68) - k35 * k69) / pivot_lower
+    k50 = (m_2_squared * (l_1_squared * k68) - k2 * k69) / pivot_lower
+    k51 = k5 * k69 / pivot_lower
+    k52 = -k51
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6),
@@ -215,16 +218,17 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
         "kinetic_energy": (c_1, c_2, k14, k15, k16, k17, k18),
         "potential_energy": (c_2, k19, k20, k21),
         "effect_powers": (c_1, c_2, k19, k22, k23),
-        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k24, k17, k20),
-        "centre_of_mass": (m_2, c_1, c_2, k24, k17, k20, k25),
-        "joint_forces": (k1, k2, k26, k3, k19, k5, k27, k6, k28, k7, k29, k30),
-        "body_poses": (c_1, c_2, k17, k20, k31),
+        "effect_forces": (k4, k24, k25),
+        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k26, k17, k20),
+        "centre_of_mass": (m_2, c_1, c_2, k26, k17, k20, k27),
+        "joint_forces": (k1, k2, k28, k3, k19, k5, k29, k6, k30, k7, k31, k32),
+        "body_poses": (c_1, c_2, k17, k20, k33),
         "body_velocities": (c_1, c_2, k17),
         "point_positions": (c_1, c_2, k17, k20),
         "point_velocities": (c_1, c_2, k17),
         "point_jacobians": (c_1, c_2, k17),
         "input_jacobian": (k1, k2, k5, k13),
-        "parameter_jacobian": (m_1, l_1, c_1, c_2, g, k2, k26, k3, k19, k5, k27, k28, k8, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50),
+        "parameter_jacobian": (m_1, l_1, c_1, c_2, g, k2, k28, k3, k19, k5, k29, k30, k8, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52),
     }
 
 
@@ -302,24 +306,24 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    load_lower_2 = tau - sin(s3) * k7 - theta_1_dot_squared * s1
-    s4 = coupling_lower_upper * k5
-    alpha_upper_2 = (s1 * omega_lower_squared - tau - load_lower_2 * s4 - sin(theta_1) * k6) / pivot_upper
-    s5 = k7 * cos(s3)
-    s6 = (s4 * s5 - k6 * cos(theta_1)) / pivot_upper
-    s7 = s5 + coupling_lower_upper * theta_1_dot_squared
-    s8 = k5 * (s1 * load_lower_2 + coupling_lower_upper * s7) + coupling_lower_upper * omega_lower_squared
-    s9 = (s8 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k9)) / pivot_upper
-    s10 = sin_theta_2 * k10
-    s11 = theta_1_dot * s10
-    s12 = omega_lower * s10
-    s13 = (s4 * s11 + s12) / pivot_upper
-    s14 = s12 / pivot_upper
+    load_lower_2 = tau - sin(angle_lower) * k7 - theta_1_dot_squared * s1
+    s3 = coupling_lower_upper * k5
+    alpha_upper_2 = (s1 * omega_lower_squared - tau - load_lower_2 * s3 - sin(theta_1) * k6) / pivot_upper
+    s4 = k7 * cos(angle_lower)
+    s5 = (s3 * s4 - k6 * cos(theta_1)) / pivot_upper
+    s6 = s4 + coupling_lower_upper * theta_1_dot_squared
+    s7 = k5 * (s1 * load_lower_2 + coupling_lower_upper * s6) + coupling_lower_upper * omega_lower_squared
+    s8 = (s7 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k9)) / pivot_upper
+    s9 = sin_theta_2 * k10
+    s10 = theta_1_dot * s9
+    s11 = omega_lower * s9
+    s12 = (s3 * s10 + s11) / pivot_upper
+    s13 = s11 / pivot_upper
     return (
         0.0,
         0.0,
@@ -329,14 +333,14 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         1.0,
-        s6,
-        s9,
+        s5,
+        s8,
+        s12,
         s13,
-        s14,
-        k8 * (s5 + coupling_lower_upper * s6) - s6,
-        k8 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper_2)) - s9,
-        k8 * (s11 + coupling_lower_upper * s13) - s13,
-        -(s14 + s4 * s14),
+        k8 * (s4 + coupling_lower_upper * s5) - s5,
+        k8 * (s6 + (coupling_lower_upper * s8 - s1 * alpha_upper_2)) - s8,
+        k8 * (s10 + coupling_lower_upper * s12) - s12,
+        -(s13 + s3 * s13),
     )
 
 
@@ -350,10 +354,10 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     coupling_lower_upper = cos(theta_2) * k3
     s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
-    s15 = tau + tau__theta_2
-    load_lower_3 = s15 - sin(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
-    s16 = tau__theta_1 + s1 * (omega_lower * omega_lower) - s15 - k5 * (coupling_lower_upper * load_lower_3)
-    alpha_upper_3 = (s16 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s14 = tau + tau__theta_2
+    load_lower_3 = s14 - sin(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
+    s15 = tau__theta_1 + s1 * (omega_lower * omega_lower) - s14 - k5 * (coupling_lower_upper * load_lower_3)
+    alpha_upper_3 = (s15 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         alpha_upper_3,
         k5 * (load_lower_3 - coupling_lower_upper * alpha_upper_3) - alpha_upper_3,
@@ -368,14 +372,14 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_1_ddot, theta_2_ddot = extra
     sin_theta_2 = sin(theta_2)
     cos_theta_2 = cos(theta_2)
-    s17 = sin(theta_1 + theta_2) * k4
+    s16 = sin(theta_1 + theta_2) * k4
     omega_lower = theta_1_dot + theta_2_dot
-    s18 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s19 = pivot_lower + cos_theta_2 * k3
-    s20 = sin(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s19)
+    s17 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s18 = pivot_lower + cos_theta_2 * k3
+    s19 = sin(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s18)
     return (
-        k3 * (s18 - sin_theta_2 * (omega_lower * omega_lower)) + (s17 + s20),
-        k3 * s18 + (s17 + (theta_1_ddot * s19 + theta_2_ddot * pivot_lower)) - tau,
+        k3 * (s17 - sin_theta_2 * (omega_lower * omega_lower)) + (s16 + s19),
+        k3 * s17 + (s16 + (theta_1_ddot * s18 + theta_2_ddot * pivot_lower)) - tau,
     )
 
 
@@ -384,11 +388,11 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     pivot_lower, k11, k12, k13 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
-    s21 = pivot_lower + cos_theta_2 * k13
+    s20 = pivot_lower + cos_theta_2 * k13
     return (
         cos_theta_2 * k11 + k12,
-        s21,
-        s21,
+        s20,
+        s20,
         pivot_lower,
     )
 
@@ -410,10 +414,10 @@ def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """6 operations: 2 add, 2 mul, 2 sin."""
     k4, k6 = k
     theta_1, theta_2, _, _ = y
-    s17 = sin(theta_1 + theta_2) * k4
+    s16 = sin(theta_1 + theta_2) * k4
     return (
-        s17 + sin(theta_1) * k6,
-        s17,
+        s16 + sin(theta_1) * k6,
+        s16,
     )
 
 
@@ -424,10 +428,10 @@ def _bias_force(y, k, u=(), extra=(), sin=sin):
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
-    s22 = sin(theta_1 + theta_2) * k7
+    s21 = sin(theta_1 + theta_2) * k7
     return (
-        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s22 + sin(theta_1) * k6),
-        s22 + theta_1_dot_squared * s1,
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s21 + sin(theta_1) * k6),
+        s21 + theta_1_dot_squared * s1,
     )
 
 
@@ -444,18 +448,18 @@ def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     """34 operations: 11 add, 19 mul, 2 sin, 2 cos."""
     c_1, c_2, k14, k15, k16, k17, k18 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s23 = theta_1_dot * cos(theta_1)
-    xd_upper = c_1 * s23
-    s24 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s24
-    s25 = c_2 * omega_lower
-    xd_lower = s23 * k17 + (xd_upper + cos(s3) * s25)
-    yd_lower = s24 * k17 + (yd_upper + sin(s3) * s25)
-    s26 = (xd_upper * xd_upper + yd_upper * yd_upper) * k16 + (theta_1_dot * theta_1_dot * k14 + omega_lower * omega_lower * k15)
+    s22 = theta_1_dot * cos(theta_1)
+    xd_upper = c_1 * s22
+    s23 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s23
+    s24 = c_2 * omega_lower
+    xd_lower = s22 * k17 + (xd_upper + cos(angle_lower) * s24)
+    yd_lower = s23 * k17 + (yd_upper + sin(angle_lower) * s24)
+    s25 = (xd_upper * xd_upper + yd_upper * yd_upper) * k16 + (theta_1_dot * theta_1_dot * k14 + omega_lower * omega_lower * k15)
     return (
-        (xd_lower * xd_lower + yd_lower * yd_lower) * k18 + s26,
+        (xd_lower * xd_lower + yd_lower * yd_lower) * k18 + s25,
     )
 
 
@@ -475,103 +479,116 @@ def _effect_powers(y, k, u=(), extra=(), sin=sin):
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     omega_lower = theta_1_dot + theta_2_dot
-    s24 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s24
-    s27 = (s24 * k23 - (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower))) * k19
+    s23 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s23
+    s26 = (s23 * k23 - (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower))) * k19
     return (
-        s27 - yd_upper * k22,
+        s26 - yd_upper * k22,
         tau * (omega_lower - theta_1_dot),
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), sin=sin):
+    """9 operations: 1 add, 2 sub, 3 mul, 1 neg, 2 sin."""
+    k4, k24, k25 = k
+    theta_1, theta_2, _, _ = y
+    tau, = u
+    s16 = sin(theta_1 + theta_2) * k4
+    sin_theta_1 = sin(theta_1)
+    return (
+        sin_theta_1 * k25 - s16 - sin_theta_1 * k24,
+        -s16,
+        0.0,
+        tau,
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """46 operations: 14 add, 2 sub, 26 mul, 2 sin, 2 cos."""
-    m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k24, k17, k20 = k
+    m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k26, k17, k20 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     cos_theta_1 = cos(theta_1)
-    s23 = theta_1_dot * cos_theta_1
-    s24 = theta_1_dot * sin_theta_1
-    s28 = c_2 * cos(s3)
-    xd_lower_2 = s23 * k17 + (c_1 * s23 + omega_lower * s28)
-    s29 = c_2 * sin(s3)
-    yd_lower_2 = s24 * k17 + (c_1 * s24 + omega_lower * s29)
-    s30 = yd_lower_2 * (sin_theta_1 * k17 + (s29 + c_1 * sin_theta_1)) - xd_lower_2 * (cos_theta_1 * k20 - s28)
-    s31 = m_1 * (c_1_squared * (sin_theta_1 * s24 + cos_theta_1 * s23)) + (I_2 * omega_lower + I_1 * theta_1_dot)
+    s22 = theta_1_dot * cos_theta_1
+    s23 = theta_1_dot * sin_theta_1
+    s27 = c_2 * cos(angle_lower)
+    xd_lower_2 = s22 * k17 + (c_1 * s22 + omega_lower * s27)
+    s28 = c_2 * sin(angle_lower)
+    yd_lower_2 = s23 * k17 + (c_1 * s23 + omega_lower * s28)
+    s29 = yd_lower_2 * (sin_theta_1 * k17 + (s28 + c_1 * sin_theta_1)) - xd_lower_2 * (cos_theta_1 * k20 - s27)
+    s30 = m_1 * (c_1_squared * (sin_theta_1 * s23 + cos_theta_1 * s22)) + (I_2 * omega_lower + I_1 * theta_1_dot)
     return (
-        m_2 * xd_lower_2 + s23 * k24,
-        m_2 * yd_lower_2 + s24 * k24,
-        m_2 * s30 + s31,
+        m_2 * xd_lower_2 + s22 * k26,
+        m_2 * yd_lower_2 + s23 * k26,
+        m_2 * s29 + s30,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 4 add, 2 sub, 11 mul, 2 sin, 2 cos."""
-    m_2, c_1, c_2, k24, k17, k20, k25 = k
+    m_2, c_1, c_2, k26, k17, k20, k27 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s32 = m_2 * (sin_theta_1 * k17 + (c_1 * sin_theta_1 + c_2 * sin(s3))) + sin_theta_1 * k24
+    s31 = m_2 * (sin_theta_1 * k17 + (c_1 * sin_theta_1 + c_2 * sin(angle_lower))) + sin_theta_1 * k26
     return (
-        s32 * k25,
-        k25 * (m_2 * (cos_theta_1 * k20 - c_2 * cos(s3)) - cos_theta_1 * k24),
+        s31 * k27,
+        k27 * (m_2 * (cos_theta_1 * k20 - c_2 * cos(angle_lower)) - cos_theta_1 * k26),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """55 operations: 8 add, 11 sub, 28 mul, 1 div, 1 neg, 3 sin, 3 cos."""
-    k1, k2, k26, k3, k19, k5, k27, k6, k28, k7, k29, k30 = k
+    k1, k2, k28, k3, k19, k5, k29, k6, k30, k7, k31, k32 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    s3 = theta_1 + theta_2
-    sin_theta_1_theta_2 = sin(s3)
+    angle_lower = theta_1 + theta_2
+    sin_angle_lower = sin(angle_lower)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s1 = sin_theta_2 * k3
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    load_lower_2 = tau - sin_theta_1_theta_2 * k7 - theta_1_dot_squared * s1
-    cos_theta_1_theta_2 = cos(s3)
+    load_lower_2 = tau - sin_angle_lower * k7 - theta_1_dot_squared * s1
+    cos_angle_lower = cos(angle_lower)
     cos_theta_1 = cos(theta_1)
-    s33 = s1 * omega_lower_squared - tau - k5 * (coupling_lower_upper * load_lower_2)
-    alpha_upper_4 = (s33 - sin_theta_1 * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s32 = s1 * omega_lower_squared - tau - k5 * (coupling_lower_upper * load_lower_2)
+    alpha_upper_4 = (s32 - sin_theta_1 * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     alpha_lower = k5 * (load_lower_2 - coupling_lower_upper * alpha_upper_4)
-    s34 = theta_1_dot_squared * sin_theta_1 - alpha_upper_4 * cos_theta_1
-    s35 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
-    s36 = k28 * s35
-    s37 = sin_theta_1 * alpha_upper_4 + theta_1_dot_squared * cos_theta_1
-    s38 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
-    s39 = k28 * s38
+    s33 = theta_1_dot_squared * sin_theta_1 - alpha_upper_4 * cos_theta_1
+    s34 = k30 * (sin_angle_lower * omega_lower_squared - alpha_lower * cos_angle_lower)
+    s35 = sin_theta_1 * alpha_upper_4 + theta_1_dot_squared * cos_theta_1
+    s36 = k30 * (sin_angle_lower * alpha_lower + omega_lower_squared * cos_angle_lower)
     return (
-        k27 * s34 + s36,
-        k29 - k27 * s37 - s39,
+        k29 * s33 + s34,
+        k31 - k29 * s35 - s36,
         0.0,
-        s36 + k26 * s34,
-        k30 * s37 - (k19 + s39),
+        s34 + k28 * s33,
+        k32 * s35 - (k19 + s36),
         -tau,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """14 operations: 3 add, 1 sub, 6 mul, 2 sin, 2 cos."""
-    c_1, c_2, k17, k20, k31 = k
+    c_1, c_2, k17, k20, k33 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
     x_upper = c_1 * sin_theta_1
     return (
         x_upper,
-        k31 * cos_theta_1,
+        k33 * cos_theta_1,
         theta_1,
-        sin_theta_1 * k17 + (x_upper + c_2 * sin(s3)),
-        cos_theta_1 * k20 - c_2 * cos(s3),
-        s3,
+        sin_theta_1 * k17 + (x_upper + c_2 * sin(angle_lower)),
+        cos_theta_1 * k20 - c_2 * cos(angle_lower),
+        angle_lower,
     )
 
 
@@ -579,19 +596,19 @@ def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """19 operations: 6 add, 9 mul, 2 sin, 2 cos."""
     c_1, c_2, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s23 = theta_1_dot * cos(theta_1)
-    xd_upper = c_1 * s23
-    s24 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s24
-    s25 = c_2 * omega_lower
+    s22 = theta_1_dot * cos(theta_1)
+    xd_upper = c_1 * s22
+    s23 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s23
+    s24 = c_2 * omega_lower
     return (
         xd_upper,
         yd_upper,
         theta_1_dot,
-        s23 * k17 + (xd_upper + cos(s3) * s25),
-        s24 * k17 + (yd_upper + sin(s3) * s25),
+        s22 * k17 + (xd_upper + cos(angle_lower) * s24),
+        s23 * k17 + (yd_upper + sin(angle_lower) * s24),
         omega_lower,
     )
 
@@ -600,13 +617,13 @@ def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 4 add, 2 sub, 5 mul, 2 sin, 2 cos."""
     c_1, c_2, k17, k20 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
-    s28 = c_2 * cos(s3)
-    s29 = c_2 * sin(s3)
+    s27 = c_2 * cos(angle_lower)
+    s28 = c_2 * sin(angle_lower)
     return (
-        s29 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s29)),
-        cos(theta_1) * k20 - s28 - s28,
+        s28 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s28)),
+        cos(theta_1) * k20 - s27 - s27,
     )
 
 
@@ -614,15 +631,15 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 8 add, 9 mul, 2 sin, 2 cos."""
     c_1, c_2, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
-    s23 = theta_1_dot * cos(theta_1)
-    s24 = theta_1_dot * sin(theta_1)
-    s25 = c_2 * (theta_1_dot + theta_2_dot)
-    s40 = cos(s3) * s25
-    s41 = sin(s3) * s25
+    angle_lower = theta_1 + theta_2
+    s22 = theta_1_dot * cos(theta_1)
+    s23 = theta_1_dot * sin(theta_1)
+    s24 = c_2 * (theta_1_dot + theta_2_dot)
+    s37 = cos(angle_lower) * s24
+    s38 = sin(angle_lower) * s24
     return (
-        s40 + (s23 * k17 + (c_1 * s23 + s40)),
-        s41 + (s24 * k17 + (c_1 * s24 + s41)),
+        s37 + (s22 * k17 + (c_1 * s22 + s37)),
+        s38 + (s23 * k17 + (c_1 * s23 + s38)),
     )
 
 
@@ -630,16 +647,16 @@ def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """19 operations: 9 add, 6 mul, 2 sin, 2 cos."""
     c_1, c_2, k17 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s28 = c_2 * cos(s3)
-    s29 = c_2 * sin(s3)
+    s27 = c_2 * cos(angle_lower)
+    s28 = c_2 * sin(angle_lower)
     return (
-        s28 + (cos_theta_1 * k17 + (c_1 * cos_theta_1 + s28)),
+        s27 + (cos_theta_1 * k17 + (c_1 * cos_theta_1 + s27)),
+        s27 + s27,
+        s28 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s28)),
         s28 + s28,
-        s29 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s29)),
-        s29 + s29,
     )
 
 
@@ -649,57 +666,57 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, theta_2, _, _ = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper_2 = cos(theta_2) * k13
-    s42 = (-1.0 - coupling_lower_upper_2 * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s39 = (-1.0 - coupling_lower_upper_2 * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         0.0,
         0.0,
-        s42,
-        k5 * (1.0 - coupling_lower_upper_2 * s42) - s42,
+        s39,
+        k5 * (1.0 - coupling_lower_upper_2 * s39) - s39,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     """142 operations: 20 add, 30 sub, 76 mul, 9 div, 3 neg, 3 sin, 1 cos."""
-    m_1, l_1, c_1, c_2, g, k2, k26, k3, k19, k5, k27, k28, k8, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50 = k
+    m_1, l_1, c_1, c_2, g, k2, k28, k3, k19, k5, k29, k30, k8, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
-    s43 = sin_theta_2 * sin_theta_2
+    s40 = sin_theta_2 * sin_theta_2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
-    sin_theta_1_theta_2 = sin(theta_1 + theta_2)
+    sin_angle_lower = sin(theta_1 + theta_2)
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s4 = coupling_lower_upper * k5
-    s18 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s44 = sin_theta_2 * (omega_lower * omega_lower)
-    pivot_upper_2 = k33 + s43 * k2
-    s45 = g * sin_theta_1_theta_2
-    load_lower_4 = tau - k28 * s45 - k3 * s18
-    s46 = coupling_lower_upper * load_lower_4
-    s47 = g * sin_theta_1
-    alpha_upper_5 = (k3 * s44 - tau - k5 * s46 - k27 * s47) / pivot_upper_2
-    s48 = load_lower_4 - coupling_lower_upper * alpha_upper_5
-    s49 = (c_1 * s47 + alpha_upper_5 * k34) / pivot_upper_2
-    s50 = cos_theta_2 * k32
-    s51 = c_2 * s45 + s18 * k32
-    s52 = s44 * k32 - (k5 * (load_lower_4 * s50 - coupling_lower_upper * s51) - s46 * k37)
-    s53 = (s52 - l_1 * s47 - alpha_upper_5 * (k35 + s43 * k36)) / pivot_upper_2
-    s54 = s48 * k38 - k5 * (s51 + (alpha_upper_5 * s50 + coupling_lower_upper * s53))
-    s55 = alpha_upper_5 * k39 / pivot_upper_2
-    s56 = (s46 * k42 - alpha_upper_5 * (k40 - s43 * k41)) / pivot_upper_2
-    s57 = cos_theta_2 * k28
-    s58 = k28 * s18
-    s59 = k28 * s44 - k5 * (load_lower_4 * s57 - coupling_lower_upper * s58) - sin_theta_1 * k19
-    s60 = (s59 - alpha_upper_5 * (k44 + s43 * k45)) / pivot_upper_2
-    s61 = (m_1 * s47 + alpha_upper_5 * k46) / pivot_upper_2
-    s62 = cos_theta_2 * k26
-    s63 = sin_theta_1_theta_2 * k19 + k26 * s18
-    s64 = k26 * s44 - (k5 * (load_lower_4 * s62 - coupling_lower_upper * s63) - s46 * k49)
-    s65 = (s64 - alpha_upper_5 * (k47 + s43 * k48)) / pivot_upper_2
-    s66 = s48 * k50 - k5 * (s63 + (alpha_upper_5 * s62 + coupling_lower_upper * s65))
-    s67 = sin_theta_1_theta_2 * k28
-    s68 = (s4 * s67 - sin_theta_1 * k27) / pivot_upper_2
+    s3 = coupling_lower_upper * k5
+    s17 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s41 = sin_theta_2 * (omega_lower * omega_lower)
+    pivot_upper_2 = k35 + s40 * k2
+    s42 = g * sin_angle_lower
+    load_lower_4 = tau - k30 * s42 - k3 * s17
+    s43 = coupling_lower_upper * load_lower_4
+    s44 = g * sin_theta_1
+    alpha_upper_5 = (k3 * s41 - tau - k5 * s43 - k29 * s44) / pivot_upper_2
+    s45 = load_lower_4 - coupling_lower_upper * alpha_upper_5
+    s46 = sin_angle_lower * k30
+    s47 = (c_1 * s44 + alpha_upper_5 * k36) / pivot_upper_2
+    s48 = cos_theta_2 * k34
+    s49 = c_2 * s42 + s17 * k34
+    s50 = s41 * k34 - (k5 * (load_lower_4 * s48 - coupling_lower_upper * s49) - s43 * k39)
+    s51 = (s50 - l_1 * s44 - alpha_upper_5 * (k37 + s40 * k38)) / pivot_upper_2
+    s52 = s45 * k40 - k5 * (s49 + (alpha_upper_5 * s48 + coupling_lower_upper * s51))
+    s53 = alpha_upper_5 * k41 / pivot_upper_2
+    s54 = (s43 * k44 - alpha_upper_5 * (k42 - s40 * k43)) / pivot_upper_2
+    s55 = cos_theta_2 * k30
+    s56 = k30 * s17
+    s57 = k30 * s41 - k5 * (load_lower_4 * s55 - coupling_lower_upper * s56) - sin_theta_1 * k19
+    s58 = (s57 - alpha_upper_5 * (k46 + s40 * k47)) / pivot_upper_2
+    s59 = (m_1 * s44 + alpha_upper_5 * k48) / pivot_upper_2
+    s60 = cos_theta_2 * k28
+    s61 = sin_angle_lower * k19 + k28 * s17
+    s62 = k28 * s41 - (k5 * (load_lower_4 * s60 - coupling_lower_upper * s61) - s43 * k51)
+    s63 = (s62 - alpha_upper_5 * (k49 + s40 * k50)) / pivot_upper_2
+    s64 = s45 * k52 - k5 * (s61 + (alpha_upper_5 * s60 + coupling_lower_upper * s63))
+    s65 = (s46 * s3 - sin_theta_1 * k29) / pivot_upper_2
     return (
         0.0,
         0.0,
@@ -717,22 +734,22 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s49,
-        s53,
-        -s55,
-        s56,
-        s60,
-        -s61,
+        -s47,
+        s51,
+        -s53,
+        s54,
+        s58,
+        -s59,
+        s63,
         s65,
-        s68,
-        s49 + s49 * s4,
-        s54 - s53,
-        s55 + s4 * s55,
-        s48 * k43 - s4 * s56 - s56,
-        k8 * (s58 + (alpha_upper_5 * s57 + coupling_lower_upper * s60)) - s60,
-        s61 + s4 * s61,
-        s66 - s65,
-        k8 * (s67 + coupling_lower_upper * s68) - s68,
+        s47 + s47 * s3,
+        s52 - s51,
+        s53 + s3 * s53,
+        s45 * k45 - s3 * s54 - s54,
+        k8 * (s56 + (alpha_upper_5 * s55 + coupling_lower_upper * s58)) - s58,
+        s59 + s3 * s59,
+        s64 - s63,
+        k8 * (s46 + coupling_lower_upper * s65) - s65,
     )
 
 
@@ -1054,6 +1071,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (2,), ('sin',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (2, 2), ('sin',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -97,6 +97,7 @@ COST = {
     "kinetic_energy": {"add": 6, "mul": 17, "sin": 1, "cos": 1, "total": 25, "parameters": 5},
     "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 7},
     "effect_powers": {"add": 1, "sub": 1, "mul": 8, "sin": 2, "cos": 1, "total": 13, "parameters": 6},
+    "effect_forces": {"add": 1, "sub": 1, "mul": 6, "sin": 2, "cos": 1, "total": 11, "parameters": 6},
     "momentum": {"add": 5, "sub": 6, "mul": 29, "sin": 2, "cos": 2, "total": 44, "parameters": 9},
     "centre_of_mass": {"mul": 2, "div": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 7},
     "joint_forces": {"add": 40, "sub": 29, "mul": 130, "div": 1, "neg": 8, "sin": 2, "cos": 2, "total": 212, "parameters": 22},
@@ -200,6 +201,7 @@ def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
         "kinetic_energy": (m_B, I_A, I_Bx, I_By, I_Bz, k23, k24),
         "potential_energy": (k25,),
         "effect_powers": (k26, k27),
+        "effect_forces": (k26, k27),
         "momentum": (I_Bz, k28, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
         "centre_of_mass": (k29, k30, k31),
         "joint_forces": (m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k28, k32, k3, k5, k33, moment_B_z, k34, k35),
@@ -474,6 +476,20 @@ def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
+def _effect_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """11 operations: 1 add, 1 sub, 6 mul, 2 sin, 1 cos."""
+    k26, k27 = k
+    q_A, q_B, _, _ = y
+    cos_q_B = cos(q_B)
+    sin_q_B = sin(q_B)
+    sin_q_A = sin(q_A)
+    s19 = sin_q_A * k27
+    return (
+        cos_q_B * (cos_q_B * s19) + sin_q_B * (sin_q_B * s19) - sin_q_A * k26,
+        0.0,
+    )
+
+
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """44 operations: 5 add, 6 sub, 29 mul, 2 sin, 2 cos."""
     I_Bz, k28, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
@@ -484,23 +500,23 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
     s15 = q_A_dot * sin_q_B
-    s19 = I_Bz * q_B_dot
-    s20 = sin_q_B * cos_q_A
-    s21 = cos_q_B * cos_q_A
-    s22 = sin_q_B * sin_q_A
-    s23 = cos_q_B * sin_q_A
-    s24 = q_A_dot * k28
-    s25 = moment_B_z * s15
-    s26 = moment_B_z * omega_B_x
-    s27 = inertia_B_xx * omega_B_x
-    s28 = inertia_B_yy * s15
+    s20 = I_Bz * q_B_dot
+    s21 = sin_q_B * cos_q_A
+    s22 = cos_q_B * cos_q_A
+    s23 = sin_q_B * sin_q_A
+    s24 = cos_q_B * sin_q_A
+    s25 = q_A_dot * k28
+    s26 = moment_B_z * s15
+    s27 = moment_B_z * omega_B_x
+    s28 = inertia_B_xx * omega_B_x
+    s29 = inertia_B_yy * s15
     return (
-        sin_q_B * s26 - cos_q_B * s25,
-        cos_q_A * s24 - (s20 * s25 + s21 * s26),
-        sin_q_A * s24 - (s22 * s25 + s23 * s26),
-        q_A_dot * inertia_A_xx + (cos_q_B * s27 + sin_q_B * s28),
-        s20 * s27 - s21 * s28 - sin_q_A * s19,
-        s22 * s27 - s23 * s28 + cos_q_A * s19,
+        sin_q_B * s27 - cos_q_B * s26,
+        cos_q_A * s25 - (s21 * s26 + s22 * s27),
+        sin_q_A * s25 - (s23 * s26 + s24 * s27),
+        q_A_dot * inertia_A_xx + (cos_q_B * s28 + sin_q_B * s29),
+        s21 * s28 - s22 * s29 - sin_q_A * s20,
+        s23 * s28 - s24 * s29 + cos_q_A * s20,
     )
 
 
@@ -527,75 +543,75 @@ def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
     s15 = q_A_dot * sin_q_B
-    s29 = cos_q_B * omega_B_x + sin_q_B * s15
-    s20 = sin_q_B * cos_q_A
-    s21 = cos_q_B * cos_q_A
-    s22 = sin_q_B * sin_q_A
-    s23 = cos_q_B * sin_q_A
+    s30 = cos_q_B * omega_B_x + sin_q_B * s15
+    s21 = sin_q_B * cos_q_A
+    s22 = cos_q_B * cos_q_A
+    s23 = sin_q_B * sin_q_A
+    s24 = cos_q_B * sin_q_A
     a_A_y = g * sin_q_A
-    s30 = (k32 * a_A_y + k3 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
-    s31 = s20 * omega_B_x - s21 * s15 - q_B_dot * sin_q_A
-    s32 = s22 * omega_B_x - s23 * s15 + q_B_dot * cos_q_A
+    s31 = (k32 * a_A_y + k3 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
+    s32 = s21 * omega_B_x - s22 * s15 - q_B_dot * sin_q_A
+    s33 = s23 * omega_B_x - s24 * s15 + q_B_dot * cos_q_A
     a_A_z = g * cos_q_A
-    s33 = q_B_dot * s15
-    s34 = q_B_dot * omega_B_x
-    s35 = cos_q_B * s30 + s33
-    s36 = sin_q_B * s30 - s34
-    s37 = a_A_y - l_A * s30
-    s38 = a_A_z + l_A * q_A_dot_squared
-    s39 = cos_q_A * s37 - sin_q_A * s38
-    s40 = sin_q_A * s37 + cos_q_A * s38
-    s41 = sin_q_B * a_A_y + k33 * (s34 + s36)
-    s42 = cos_q_B * a_A_y + k33 * (s35 - s33)
-    s43 = a_A_z - k33 * (omega_B_x * omega_B_x + s15 * s15)
-    s44 = cos_q_B * s41 - sin_q_B * s42
-    s45 = s20 * s41 + s21 * s42 - sin_q_A * s43
-    s46 = s22 * s41 + s23 * s42 + cos_q_A * s43
-    s47 = cos_q_B * s35 + sin_q_B * s36
-    s48 = s1 * q_A_dot_squared * k5
-    s49 = s21 * s36 - s20 * s35 - sin_q_A * s48
-    s50 = s23 * s36 - s22 * s35 + cos_q_A * s48
-    s51 = I_Bx * cos_q_B
-    s52 = I_By * sin_q_B
-    s53 = I_Bx * s20
-    s54 = I_By * s21
-    s55 = I_Bz * sin_q_A
-    s56 = I_Bx * s22
-    s57 = I_By * s23
-    s58 = I_Bz * cos_q_A
-    s59 = cos_q_B * s51 + sin_q_B * s52
-    s60 = s20 * s51 - s21 * s52
-    s61 = s22 * s51 - s23 * s52
-    s62 = cos_q_B * s53 - sin_q_B * s54
-    s63 = s20 * s53 + s21 * s54 + sin_q_A * s55
-    s64 = s22 * s53 + s23 * s54 - cos_q_A * s55
-    s65 = cos_q_B * s56 - sin_q_B * s57
-    s66 = s20 * s56 + s21 * s57 - sin_q_A * s58
-    s67 = s22 * s56 + s23 * s57 + cos_q_A * s58
-    s68 = m_B * s45
+    s34 = q_B_dot * s15
+    s35 = q_B_dot * omega_B_x
+    s36 = cos_q_B * s31 + s34
+    s37 = sin_q_B * s31 - s35
+    s38 = a_A_y - l_A * s31
+    s39 = a_A_z + l_A * q_A_dot_squared
+    s40 = cos_q_A * s38 - sin_q_A * s39
+    s41 = sin_q_A * s38 + cos_q_A * s39
+    s42 = sin_q_B * a_A_y + k33 * (s35 + s37)
+    s43 = cos_q_B * a_A_y + k33 * (s36 - s34)
+    s44 = a_A_z - k33 * (omega_B_x * omega_B_x + s15 * s15)
+    s45 = cos_q_B * s42 - sin_q_B * s43
+    s46 = s21 * s42 + s22 * s43 - sin_q_A * s44
+    s47 = s23 * s42 + s24 * s43 + cos_q_A * s44
+    s48 = cos_q_B * s36 + sin_q_B * s37
+    s49 = s1 * q_A_dot_squared * k5
+    s50 = s22 * s37 - s21 * s36 - sin_q_A * s49
+    s51 = s24 * s37 - s23 * s36 + cos_q_A * s49
+    s52 = I_Bx * cos_q_B
+    s53 = I_By * sin_q_B
+    s54 = I_Bx * s21
+    s55 = I_By * s22
+    s56 = I_Bz * sin_q_A
+    s57 = I_Bx * s23
+    s58 = I_By * s24
+    s59 = I_Bz * cos_q_A
+    s60 = cos_q_B * s52 + sin_q_B * s53
+    s61 = s21 * s52 - s22 * s53
+    s62 = s23 * s52 - s24 * s53
+    s63 = cos_q_B * s54 - sin_q_B * s55
+    s64 = s21 * s54 + s22 * s55 + sin_q_A * s56
+    s65 = s23 * s54 + s24 * s55 - cos_q_A * s56
+    s66 = cos_q_B * s57 - sin_q_B * s58
+    s67 = s21 * s57 + s22 * s58 - sin_q_A * s59
+    s68 = s23 * s57 + s24 * s58 + cos_q_A * s59
     s69 = m_B * s46
-    s70 = s29 * s59 + s31 * s60 + s32 * s61
-    s71 = s29 * s62 + s31 * s63 + s32 * s64
-    s72 = s29 * s65 + s31 * s66 + s32 * s67
-    s73 = s49 * s60 - s47 * s59 + s50 * s61 + (s31 * s72 - s32 * s71)
-    s74 = s49 * s63 - s47 * s62 + s50 * s64 + (s32 * s70 - s29 * s72)
-    s75 = s49 * s66 - s47 * s65 + s50 * s67 + (s29 * s71 - s31 * s70)
-    s76 = s44 * moment_B_z
-    s77 = k28 * (sin_q_A * s40 + cos_q_A * s39) - I_A * s30 + (s73 - moment_B_z * (sin_q_A * s46 + cos_q_A * s45))
-    s78 = k34 * s44
+    s70 = m_B * s47
+    s71 = s30 * s60 + s32 * s61 + s33 * s62
+    s72 = s30 * s63 + s32 * s64 + s33 * s65
+    s73 = s30 * s66 + s32 * s67 + s33 * s68
+    s74 = s50 * s61 - s48 * s60 + s51 * s62 + (s32 * s73 - s33 * s72)
+    s75 = s50 * s64 - s48 * s63 + s51 * s65 + (s33 * s71 - s30 * s73)
+    s76 = s50 * s67 - s48 * s66 + s51 * s68 + (s30 * s72 - s32 * s71)
+    s77 = s45 * moment_B_z
+    s78 = k28 * (sin_q_A * s41 + cos_q_A * s40) - I_A * s31 + (s74 - moment_B_z * (sin_q_A * s47 + cos_q_A * s46))
+    s79 = k34 * s45
     return (
-        s78,
-        k35 * s39 - s68,
+        s79,
         k35 * s40 - s69,
-        -s77,
-        -(s74 + cos_q_A * s76),
-        -(s75 + sin_q_A * s76),
-        s78,
-        -s68,
+        k35 * s41 - s70,
+        -s78,
+        -(s75 + cos_q_A * s77),
+        -(s76 + sin_q_A * s77),
+        s79,
         -s69,
-        -s73,
+        -s70,
         -s74,
         -s75,
+        -s76,
     )
 
 
@@ -607,7 +623,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
-    s79 = -sin_q_A
+    s80 = -sin_q_A
     return (
         1.0,
         0.0,
@@ -615,7 +631,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         cos_q_A,
-        s79,
+        s80,
         l_A * sin_q_A,
         0.0,
         sin_q_A,
@@ -627,7 +643,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         sin_q_B * cos_q_A,
         cos_q_B * cos_q_A,
-        s79,
+        s80,
         sin_q_A * k37,
         sin_q_B * sin_q_A,
         cos_q_B * sin_q_A,
@@ -646,26 +662,26 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
     s15 = q_A_dot * sin_q_B
-    s29 = cos_q_B * omega_B_x + sin_q_B * s15
-    s80 = cos_q_A * k33
-    s81 = sin_q_A * k33
-    s82 = l_A * q_A_dot
-    s83 = sin_q_B * omega_B_x - cos_q_B * s15
-    s84 = cos_q_A * s83 - q_B_dot * sin_q_A
-    s85 = sin_q_A * s83 + q_B_dot * cos_q_A
+    s30 = cos_q_B * omega_B_x + sin_q_B * s15
+    s81 = cos_q_A * k33
+    s82 = sin_q_A * k33
+    s83 = l_A * q_A_dot
+    s84 = sin_q_B * omega_B_x - cos_q_B * s15
+    s85 = cos_q_A * s84 - q_B_dot * sin_q_A
+    s86 = sin_q_A * s84 + q_B_dot * cos_q_A
     return (
         0.0,
-        cos_q_A * s82,
-        sin_q_A * s82,
+        cos_q_A * s83,
+        sin_q_A * s83,
         q_A_dot,
         0.0,
         0.0,
-        s80 * s84 + s81 * s85,
-        -s80 * s29,
-        -s81 * s29,
-        s29,
-        s84,
+        s81 * s85 + s82 * s86,
+        -s81 * s30,
+        -s82 * s30,
+        s30,
         s85,
+        s86,
     )
 
 
@@ -982,6 +998,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos', 'sin'), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 2), ('cos', 'sin'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -91,6 +91,7 @@ COST = {
     "kinetic_energy": {"add": 4, "mul": 11, "sin": 1, "cos": 1, "total": 17, "parameters": 0},
     "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
     "effect_powers": {"mul": 3, "sin": 1, "total": 4, "parameters": 3},
+    "effect_forces": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 3},
     "centre_of_mass": {"add": 2, "mul": 4, "div": 2, "sin": 1, "cos": 1, "total": 10, "parameters": 3},
     "joint_forces": {"add": 8, "sub": 6, "mul": 22, "div": 1, "neg": 2, "sin": 1, "cos": 1, "total": 41, "parameters": 20},
@@ -183,6 +184,7 @@ def _fixed(m_cart, m_pole, I_pole, l, g):
         "kinetic_energy": (m_cart, m_pole, I_pole, l),
         "potential_energy": (k38,),
         "effect_powers": (k38,),
+        "effect_forces": (k38,),
         "momentum": (m_cart, m_pole, k4, inertia_pole_zz),
         "centre_of_mass": (m_cart, m_pole, l, k35, k36),
         "joint_forces": (m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k33, k6, k39, k40),
@@ -456,6 +458,19 @@ def _effect_powers(y, k, u=(), extra=(), sin=sin):
     return (
         k38 * (theta_dot * sin(theta)),
         x_dot * push,
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), sin=sin):
+    """2 operations: 1 mul, 1 sin."""
+    k38, = k
+    _, theta, _, _ = y
+    push, = u
+    return (
+        0.0,
+        sin(theta) * k38,
+        push,
+        0.0,
     )
 
 
@@ -888,6 +903,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (2,), ('sin',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (2, 2), ('sin',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -84,6 +84,7 @@ COST = {
     "kinetic_energy": {"add": 11, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
     "effect_powers": {"add": 3, "sub": 2, "mul": 6, "cos": 2, "total": 13, "parameters": 5},
+    "effect_forces": {"add": 2, "sub": 1, "mul": 3, "neg": 1, "cos": 2, "total": 9, "parameters": 9},
     "momentum": {"add": 16, "sub": 1, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 9},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
     "joint_forces": {"add": 12, "sub": 5, "mul": 28, "div": 1, "sin": 3, "cos": 3, "total": 52, "parameters": 31},
@@ -124,65 +125,68 @@ def _fixed(m_1, m_2, l_1, l_2, g):
     if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
         return "inertia_com of lower is negative"
     l_2_squared = l_2 * l_2
-    k47 = m_2 * l_2_squared
-    pivot_lower = k47 / 3.0
+    k50 = m_2 * l_2_squared
+    pivot_lower = k50 / 3.0
     l_1_squared = l_1 * l_1
-    k48 = m_2 * 3.0
-    k49 = k48 + m_1 * 4.0
-    k1 = l_1_squared * k49 / 12.0
-    k2 = l_1_squared * k48 / 4.0
-    k28 = m_2 * l_1
-    k10 = l_2 * k28
+    k51 = m_2 * 3.0
+    k52 = k51 + m_1 * 4.0
+    k1 = l_1_squared * k52 / 12.0
+    k2 = l_1_squared * k51 / 4.0
+    k31 = m_2 * l_1
+    k10 = l_2 * k31
     k3 = k10 / 2.0
-    k50 = m_2 * l_2
-    k4 = g * k50 / 2.0
+    k53 = m_2 * l_2
+    k4 = g * k53 / 2.0
     k5 = 1.0 / pivot_lower
-    k51 = m_1 * l_1
-    k6 = g * k28 + g * k51 / 2.0
+    k54 = m_1 * l_1
+    k6 = g * k31 + g * k54 / 2.0
     k7 = -k5
     k8 = k2 * 2.0
     k9 = 2.0 * k3
-    k52 = m_2 * l_1_squared
-    k53 = m_1 * l_1_squared
-    k54 = k53 / 3.0
-    k11 = k52 + (pivot_lower + k54)
-    k12 = k54 + (pivot_lower + k52)
+    k55 = m_2 * l_1_squared
+    k56 = m_1 * l_1_squared
+    k57 = k56 / 3.0
+    k11 = k55 + (pivot_lower + k57)
+    k12 = k57 + (pivot_lower + k55)
     k21 = m_2 * g
     k13 = l_2 * k21 / 2.0
-    k32 = l_1 * g
-    k14 = l_1 * k21 + m_1 * k32 / 2.0
+    k35 = l_1 * g
+    k14 = l_1 * k21 + m_1 * k35 / 2.0
     k15 = l_1 / 2.0
     k16 = m_1 / 2.0
     k17 = l_2 / 2.0
     k18 = m_2 / 2.0
-    k19 = k53 / 24.0
-    k20 = k47 / 24.0
+    k19 = k56 / 24.0
+    k20 = k50 / 24.0
     k22 = m_1 * g
     k23 = -k17
-    k24 = -m_2
-    k25 = k47 / 12.0
-    k26 = k53 / 12.0
-    k55 = m_1 + m_2
-    k27 = 1.0 / k55
-    k29 = k50 / 2.0
-    k30 = l_1 * (m_1 + m_2 * 2.0) / 2.0
-    k31 = g * k55
-    k33 = l_1_squared * 4.0 / 12.0
-    k34 = k32 / 2.0
-    k56 = 3.0 * l_1_squared
-    k35 = k56 / 12.0
-    k36 = k56 / 4.0
-    k37 = l_1 * l_2 / 2.0
-    k38 = l_2 * g / 2.0
-    k39 = k5 * (l_2_squared / 3.0) / pivot_lower
-    k57 = l_1 * 2.0
-    k40 = k49 * k57 / 12.0
-    k41 = k48 * k57 / 4.0
-    k42 = k21 + k22 / 2.0
-    k43 = k28 / 2.0
-    k44 = k21 / 2.0
-    k45 = k5 * (2.0 * k50 / 3.0) / pivot_lower
-    k46 = k28 + k51 / 2.0
+    k24 = k17 * k21
+    k25 = k21 * (k15 + k15)
+    k26 = -k15 * k22
+    k27 = k56 / 12.0
+    k28 = k50 / 12.0
+    k29 = -m_2
+    k58 = m_1 + m_2
+    k30 = 1.0 / k58
+    k32 = k53 / 2.0
+    k33 = l_1 * (m_1 + m_2 * 2.0) / 2.0
+    k34 = g * k58
+    k36 = l_1_squared * 4.0 / 12.0
+    k37 = k35 / 2.0
+    k59 = 3.0 * l_1_squared
+    k38 = k59 / 12.0
+    k39 = k59 / 4.0
+    k40 = l_1 * l_2 / 2.0
+    k41 = l_2 * g / 2.0
+    k42 = k5 * (l_2_squared / 3.0) / pivot_lower
+    k60 = l_1 * 2.0
+    k43 = k52 * k60 / 12.0
+    k44 = k51 * k60 / 4.0
+    k45 = k21 + k22 / 2.0
+    k46 = k31 / 2.0
+    k47 = k21 / 2.0
+    k48 = k5 * (2.0 * k53 / 3.0) / pivot_lower
+    k49 = k31 + k54 / 2.0
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
@@ -197,12 +201,13 @@ def _fixed(m_1, m_2, l_1, l_2, g):
         "kinetic_energy": (k15, k16, k17, k18, k19, k20),
         "potential_energy": (k21, k15, k17, k22),
         "effect_powers": (k21, k15, k22, k23),
-        "momentum": (m_1, m_2, k15, k17, k24, k25, k26),
-        "centre_of_mass": (m_1, m_2, k15, k17, k27),
-        "joint_forces": (k1, k2, k28, k3, k4, k5, k6, k21, k29, k30, k31),
+        "effect_forces": (k24, k25, k26),
+        "momentum": (m_1, m_2, k15, k17, k27, k28, k29),
+        "centre_of_mass": (m_1, m_2, k15, k17, k30),
+        "joint_forces": (k1, k2, k31, k3, k4, k5, k6, k21, k32, k33, k34),
         "body_poses": (k15, k17),
         "body_velocities": (k15, k17),
-        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k7, k32, k29, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46),
+        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k7, k35, k32, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49),
     }
 
 
@@ -278,24 +283,24 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s1 = sin_theta_2 * k3
-    s2 = cos(s3) * k4 + theta_1_dot_squared * s1
+    s2 = cos(angle_lower) * k4 + theta_1_dot_squared * s1
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    s4 = coupling_lower_upper * k5
-    alpha_upper_2 = (s2 * s4 + s1 * omega_lower_squared - cos(theta_1) * k6) / pivot_upper
-    s5 = k4 * sin(s3)
-    s6 = (k6 * sin(theta_1) - s4 * s5) / pivot_upper
-    s7 = coupling_lower_upper * theta_1_dot_squared - s5
-    s8 = k5 * (coupling_lower_upper * s7 - s1 * s2) + coupling_lower_upper * omega_lower_squared
-    s9 = (s8 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
-    s10 = sin_theta_2 * k9
-    s11 = theta_1_dot * s10
-    s12 = omega_lower * s10
-    s13 = (s4 * s11 + s12) / pivot_upper
-    s14 = s12 / pivot_upper
+    s3 = coupling_lower_upper * k5
+    alpha_upper_2 = (s2 * s3 + s1 * omega_lower_squared - cos(theta_1) * k6) / pivot_upper
+    s4 = k4 * sin(angle_lower)
+    s5 = (k6 * sin(theta_1) - s3 * s4) / pivot_upper
+    s6 = coupling_lower_upper * theta_1_dot_squared - s4
+    s7 = k5 * (coupling_lower_upper * s6 - s1 * s2) + coupling_lower_upper * omega_lower_squared
+    s8 = (s7 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
+    s9 = sin_theta_2 * k9
+    s10 = theta_1_dot * s9
+    s11 = omega_lower * s9
+    s12 = (s3 * s10 + s11) / pivot_upper
+    s13 = s11 / pivot_upper
     return (
         0.0,
         0.0,
@@ -305,14 +310,14 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         1.0,
-        s6,
-        s9,
+        s5,
+        s8,
+        s12,
         s13,
-        s14,
-        k7 * (coupling_lower_upper * s6 - s5) - s6,
-        k7 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper_2)) - s9,
-        k7 * (s11 + coupling_lower_upper * s13) - s13,
-        -(s14 + s4 * s14),
+        k7 * (coupling_lower_upper * s5 - s4) - s5,
+        k7 * (s6 + (coupling_lower_upper * s8 - s1 * alpha_upper_2)) - s8,
+        k7 * (s10 + coupling_lower_upper * s12) - s12,
+        -(s13 + s3 * s13),
     )
 
 
@@ -326,8 +331,8 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
     load_lower = tau__theta_2 - cos(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
-    s15 = tau__theta_1 + s1 * (omega_lower * omega_lower) - tau__theta_2 - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper_3 = (s15 - cos(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s14 = tau__theta_1 + s1 * (omega_lower * omega_lower) - tau__theta_2 - k5 * (coupling_lower_upper * load_lower)
+    alpha_upper_3 = (s14 - cos(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         alpha_upper_3,
         k5 * (load_lower - coupling_lower_upper * alpha_upper_3) - alpha_upper_3,
@@ -341,14 +346,14 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_1_ddot, theta_2_ddot = extra
     cos_theta_2 = cos(theta_2)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s16 = cos(theta_1 + theta_2) * k4
+    s15 = cos(theta_1 + theta_2) * k4
     s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
-    s17 = pivot_lower + cos_theta_2 * k3
-    s18 = cos(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s17)
+    s16 = pivot_lower + cos_theta_2 * k3
+    s17 = cos(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s16)
     return (
-        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + s18),
-        theta_1_dot_squared * s1 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)),
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s15 + s17),
+        theta_1_dot_squared * s1 + (s15 + (theta_1_ddot * s16 + theta_2_ddot * pivot_lower)),
     )
 
 
@@ -357,11 +362,11 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     pivot_lower, k10, k3, k12 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
-    s17 = pivot_lower + cos_theta_2 * k3
+    s16 = pivot_lower + cos_theta_2 * k3
     return (
         cos_theta_2 * k10 + k12,
-        s17,
-        s17,
+        s16,
+        s16,
         pivot_lower,
     )
 
@@ -383,10 +388,10 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
     k13, k14 = k
     theta_1, theta_2, _, _ = y
-    s19 = cos(theta_1 + theta_2) * k13
+    s18 = cos(theta_1 + theta_2) * k13
     return (
-        s19 + cos(theta_1) * k14,
-        s19,
+        s18 + cos(theta_1) * k14,
+        s18,
     )
 
 
@@ -395,12 +400,12 @@ def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     k3, k4, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s16 = cos(theta_1 + theta_2) * k4
+    s15 = cos(theta_1 + theta_2) * k4
     s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + cos(theta_1) * k6),
-        s16 + theta_1_dot_squared * s1,
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s15 + cos(theta_1) * k6),
+        s15 + theta_1_dot_squared * s1,
     )
 
 
@@ -416,17 +421,17 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """31 operations: 11 add, 16 mul, 2 sin, 2 cos."""
     k15, k16, k17, k18, k19, k20 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s20 = theta_1_dot * k15
-    s21 = sin(theta_1) * s20
-    yd_upper = cos(theta_1) * s20
-    s22 = omega_lower * k17
-    s23 = sin(s3) * s22 + (s21 + s21)
-    yd_lower = cos(s3) * s22 + (yd_upper + yd_upper)
-    s24 = (s21 * s21 + yd_upper * yd_upper) * k16 + (s23 * s23 + yd_lower * yd_lower) * k18
+    s19 = theta_1_dot * k15
+    s20 = sin(theta_1) * s19
+    yd_upper = cos(theta_1) * s19
+    s21 = omega_lower * k17
+    s22 = sin(angle_lower) * s21 + (s20 + s20)
+    yd_lower = cos(angle_lower) * s21 + (yd_upper + yd_upper)
+    s23 = (s20 * s20 + yd_upper * yd_upper) * k16 + (s22 * s22 + yd_lower * yd_lower) * k18
     return (
-        omega_lower * omega_lower * k20 + (theta_1_dot * theta_1_dot * k19 + s24),
+        omega_lower * omega_lower * k20 + (theta_1_dot * theta_1_dot * k19 + s23),
     )
 
 
@@ -445,80 +450,92 @@ def _effect_powers(y, k, u=(), extra=(), cos=cos):
     k21, k15, k22, k23 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     yd_upper_2 = k15 * (theta_1_dot * cos(theta_1))
-    s25 = k23 * (cos(theta_1 + theta_2) * (theta_1_dot + theta_2_dot)) - (yd_upper_2 + yd_upper_2)
+    s24 = k23 * (cos(theta_1 + theta_2) * (theta_1_dot + theta_2_dot)) - (yd_upper_2 + yd_upper_2)
     return (
-        s25 * k21 - yd_upper_2 * k22,
+        s24 * k21 - yd_upper_2 * k22,
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), cos=cos):
+    """9 operations: 2 add, 1 sub, 3 mul, 1 neg, 2 cos."""
+    k24, k25, k26 = k
+    theta_1, theta_2, _, _ = y
+    cos_theta_1 = cos(theta_1)
+    s25 = cos(theta_1 + theta_2) * k24
+    return (
+        cos_theta_1 * k26 - (s25 + cos_theta_1 * k25),
+        -s25,
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """42 operations: 16 add, 1 sub, 21 mul, 2 sin, 2 cos."""
-    m_1, m_2, k15, k17, k24, k25, k26 = k
+    m_1, m_2, k15, k17, k27, k28, k29 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     sin_theta_1 = sin(theta_1)
-    s20 = theta_1_dot * k15
-    s21 = sin_theta_1 * s20
-    yd_upper = cos_theta_1 * s20
+    s19 = theta_1_dot * k15
+    s20 = sin_theta_1 * s19
+    yd_upper = cos_theta_1 * s19
     y_upper = sin_theta_1 * k15
-    s26 = sin(s3) * k17
-    s27 = omega_lower * s26 + (s21 + s21)
-    s28 = cos(s3) * k17
+    s26 = sin(angle_lower) * k17
+    s27 = omega_lower * s26 + (s20 + s20)
+    s28 = cos(angle_lower) * k17
     yd_lower_2 = omega_lower * s28 + (yd_upper + yd_upper)
     x_upper = cos_theta_1 * k15
     s29 = yd_lower_2 * (s28 + (x_upper + x_upper)) + s27 * (s26 + (y_upper + y_upper))
-    s30 = omega_lower * k25 + (m_1 * (yd_upper * x_upper + s21 * y_upper) + m_2 * s29)
+    s30 = omega_lower * k28 + (m_1 * (yd_upper * x_upper + s20 * y_upper) + m_2 * s29)
     return (
-        k24 * s27 - m_1 * s21,
+        k29 * s27 - m_1 * s20,
         m_2 * yd_lower_2 + m_1 * yd_upper,
-        theta_1_dot * k26 + s30,
+        theta_1_dot * k27 + s30,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
-    m_1, m_2, k15, k17, k27 = k
+    m_1, m_2, k15, k17, k30 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     y_upper = sin(theta_1) * k15
     x_upper = cos(theta_1) * k15
     return (
-        (m_2 * (cos(s3) * k17 + (x_upper + x_upper)) + m_1 * x_upper) * k27,
-        k27 * (m_2 * (sin(s3) * k17 + (y_upper + y_upper)) + m_1 * y_upper),
+        (m_2 * (cos(angle_lower) * k17 + (x_upper + x_upper)) + m_1 * x_upper) * k30,
+        k30 * (m_2 * (sin(angle_lower) * k17 + (y_upper + y_upper)) + m_1 * y_upper),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """52 operations: 12 add, 5 sub, 28 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k28, k3, k4, k5, k6, k21, k29, k30, k31 = k
+    k1, k2, k31, k3, k4, k5, k6, k21, k32, k33, k34 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    s3 = theta_1 + theta_2
-    cos_theta_1_theta_2 = cos(s3)
+    angle_lower = theta_1 + theta_2
+    cos_angle_lower = cos(angle_lower)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s1 = sin_theta_2 * k3
-    s2 = cos_theta_1_theta_2 * k4 + theta_1_dot_squared * s1
+    s2 = cos_angle_lower * k4 + theta_1_dot_squared * s1
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
     load_upper = k5 * (coupling_lower_upper * s2) + s1 * omega_lower_squared - cos_theta_1 * k6
     alpha_upper = load_upper / (k1 + sin_theta_2 * sin_theta_2 * k2)
-    sin_theta_1_theta_2 = sin(s3)
+    sin_angle_lower = sin(angle_lower)
     sin_theta_1 = sin(theta_1)
     s31 = k5 * (s2 + coupling_lower_upper * alpha_upper)
-    s32 = k29 * (cos_theta_1_theta_2 * omega_lower_squared - s31 * sin_theta_1_theta_2)
+    s32 = k32 * (cos_angle_lower * omega_lower_squared - s31 * sin_angle_lower)
     s33 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
     s34 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
-    s35 = k29 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s31)
+    s35 = k32 * (omega_lower_squared * sin_angle_lower + cos_angle_lower * s31)
     return (
-        s32 + k30 * s33,
-        k30 * s34 + s35 - k31,
+        s32 + k33 * s33,
+        k33 * s34 + s35 - k34,
         0.0,
-        s32 + k28 * s33,
-        s35 + k28 * s34 - k21,
+        s32 + k31 * s33,
+        s35 + k31 * s34 - k21,
         0.0,
     )
 
@@ -527,16 +544,16 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
     k15, k17 = k
     theta_1, theta_2, _, _ = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     y_upper = sin(theta_1) * k15
     x_upper = cos(theta_1) * k15
     return (
         x_upper,
         y_upper,
         theta_1,
-        cos(s3) * k17 + (x_upper + x_upper),
-        sin(s3) * k17 + (y_upper + y_upper),
-        s3,
+        cos(angle_lower) * k17 + (x_upper + x_upper),
+        sin(angle_lower) * k17 + (y_upper + y_upper),
+        angle_lower,
     )
 
 
@@ -544,57 +561,57 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     """18 operations: 6 add, 6 mul, 2 neg, 2 sin, 2 cos."""
     k15, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s3 = theta_1 + theta_2
+    angle_lower = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s20 = theta_1_dot * k15
-    s21 = sin(theta_1) * s20
-    yd_upper = cos(theta_1) * s20
-    s22 = omega_lower * k17
+    s19 = theta_1_dot * k15
+    s20 = sin(theta_1) * s19
+    yd_upper = cos(theta_1) * s19
+    s21 = omega_lower * k17
     return (
-        -s21,
+        -s20,
         yd_upper,
         theta_1_dot,
-        -(sin(s3) * s22 + (s21 + s21)),
-        cos(s3) * s22 + (yd_upper + yd_upper),
+        -(sin(angle_lower) * s21 + (s20 + s20)),
+        cos(angle_lower) * s21 + (yd_upper + yd_upper),
         omega_lower,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     """114 operations: 27 add, 12 sub, 62 mul, 6 div, 3 neg, 1 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k32, k29, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46 = k
+    k1, k2, k3, k4, k5, k6, k7, k35, k32, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     s36 = sin_theta_2 * sin_theta_2
     pivot_upper = k1 + s36 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
-    cos_theta_1_theta_2 = cos(theta_1 + theta_2)
+    cos_angle_lower = cos(theta_1 + theta_2)
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s4 = coupling_lower_upper * k5
+    s3 = coupling_lower_upper * k5
     s37 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s38 = cos_theta_1_theta_2 * k4 + k3 * s37
+    s38 = cos_angle_lower * k4 + k3 * s37
     s39 = coupling_lower_upper * s38
     s40 = sin_theta_2 * (omega_lower * omega_lower)
     alpha_upper_4 = (k5 * s39 + k3 * s40 - cos_theta_1 * k6) / pivot_upper
     s41 = s38 + coupling_lower_upper * alpha_upper_4
-    s42 = (cos_theta_1 * k34 + alpha_upper_4 * k33) / pivot_upper
-    s43 = cos_theta_2 * k37
-    s44 = cos_theta_1_theta_2 * k38 + s37 * k37
-    s45 = k5 * (s38 * s43 + coupling_lower_upper * s44) - s39 * k39 + s40 * k37 - cos_theta_1 * k32
-    s46 = (s45 - alpha_upper_4 * (k35 + s36 * k36)) / pivot_upper
-    s47 = k5 * (s44 + (alpha_upper_4 * s43 + coupling_lower_upper * s46)) - s41 * k39
-    s48 = cos_theta_2 * k29
-    s49 = s37 * k29
-    s50 = k5 * (s38 * s48 + coupling_lower_upper * s49) + s40 * k29 - cos_theta_1 * k42
-    s51 = (s50 - alpha_upper_4 * (k40 + s36 * k41)) / pivot_upper
-    s52 = cos_theta_2 * k43
-    s53 = cos_theta_1_theta_2 * k44 + s37 * k43
-    s54 = (k5 * (s38 * s52 + coupling_lower_upper * s53) - s39 * k45 + s40 * k43) / pivot_upper
-    s55 = k5 * (s53 + (alpha_upper_4 * s52 + coupling_lower_upper * s54)) - s41 * k45
-    s56 = cos_theta_1_theta_2 * k29
-    s57 = (s4 * s56 - cos_theta_1 * k46) / pivot_upper
+    s42 = (cos_theta_1 * k37 + alpha_upper_4 * k36) / pivot_upper
+    s43 = cos_theta_2 * k40
+    s44 = cos_angle_lower * k41 + s37 * k40
+    s45 = k5 * (s38 * s43 + coupling_lower_upper * s44) - s39 * k42 + s40 * k40 - cos_theta_1 * k35
+    s46 = (s45 - alpha_upper_4 * (k38 + s36 * k39)) / pivot_upper
+    s47 = k5 * (s44 + (alpha_upper_4 * s43 + coupling_lower_upper * s46)) - s41 * k42
+    s48 = cos_theta_2 * k32
+    s49 = s37 * k32
+    s50 = k5 * (s38 * s48 + coupling_lower_upper * s49) + s40 * k32 - cos_theta_1 * k45
+    s51 = (s50 - alpha_upper_4 * (k43 + s36 * k44)) / pivot_upper
+    s52 = cos_theta_2 * k46
+    s53 = cos_angle_lower * k47 + s37 * k46
+    s54 = (k5 * (s38 * s52 + coupling_lower_upper * s53) - s39 * k48 + s40 * k46) / pivot_upper
+    s55 = k5 * (s53 + (alpha_upper_4 * s52 + coupling_lower_upper * s54)) - s41 * k48
+    s56 = cos_angle_lower * k32
+    s57 = (s3 * s56 - cos_theta_1 * k49) / pivot_upper
     return (
         0.0,
         0.0,
@@ -611,7 +628,7 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         s51,
         s54,
         s57,
-        s42 + s42 * s4,
+        s42 + s42 * s3,
         -(s46 + s47),
         k7 * (s49 + (alpha_upper_4 * s48 + coupling_lower_upper * s51)) - s51,
         -(s54 + s55),
@@ -932,6 +949,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 2), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

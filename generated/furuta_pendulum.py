@@ -97,6 +97,7 @@ COST = {
     "kinetic_energy": {"add": 8, "mul": 19, "sin": 1, "cos": 1, "total": 29, "parameters": 15},
     "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 4},
     "effect_powers": {"add": 3, "sub": 4, "mul": 18, "sin": 2, "cos": 2, "total": 29, "parameters": 5},
+    "effect_forces": {"add": 3, "sub": 3, "mul": 18, "sin": 2, "cos": 2, "total": 28, "parameters": 4},
     "momentum": {"add": 12, "sub": 4, "mul": 35, "neg": 1, "sin": 2, "cos": 2, "total": 56, "parameters": 20},
     "centre_of_mass": {"add": 3, "sub": 1, "mul": 10, "div": 3, "sin": 2, "cos": 2, "total": 21, "parameters": 7},
     "joint_forces": {"add": 43, "sub": 39, "mul": 133, "div": 1, "neg": 6, "sin": 2, "cos": 2, "total": 226, "parameters": 37},
@@ -165,88 +166,88 @@ def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
         return "inertia_com yy of pendulum is negative"
     l_pendulum_squared = l_pendulum * l_pendulum
     gear_squared = gear * gear
-    k56 = J_rotor * gear_squared
+    k57 = J_rotor * gear_squared
     l_arm_squared = l_arm * l_arm
-    k57 = m_arm * l_arm_squared
-    k58 = k57 / 3.0
-    k59 = m_pendulum * l_arm_squared
-    k60 = k59 / 4.0
-    k61 = l_pendulum_squared * 4.0 + l_arm_squared * 9.0
-    k1 = m_pendulum * k61 / 12.0
-    k62 = k56 + k58
-    k2 = k60 + k62
-    k63 = l_arm * 3.0
-    k64 = m_pendulum * k63
-    k3 = g * k64 / 4.0
-    k65 = m_pendulum * 2.0
-    k4 = l_pendulum_squared * k65 / 3.0
-    k66 = l_arm * m_pendulum
-    k5 = l_pendulum * k66 / 2.0
-    k67 = l_pendulum * 2.0
-    k68 = g * 3.0
-    k6 = k68 / k67
-    k7 = k63 / k67
-    k8 = k58 + (k56 + k60)
+    k58 = m_arm * l_arm_squared
+    k59 = k58 / 3.0
+    k60 = m_pendulum * l_arm_squared
+    k61 = k60 / 4.0
+    k62 = l_pendulum_squared * 4.0 + l_arm_squared * 9.0
+    k1 = m_pendulum * k62 / 12.0
+    k63 = k57 + k59
+    k2 = k61 + k63
+    k64 = l_arm * 3.0
+    k65 = m_pendulum * k64
+    k3 = g * k65 / 4.0
+    k66 = m_pendulum * 2.0
+    k4 = l_pendulum_squared * k66 / 3.0
+    k67 = l_arm * m_pendulum
+    k5 = l_pendulum * k67 / 2.0
+    k68 = l_pendulum * 2.0
+    k69 = g * 3.0
+    k6 = k69 / k68
+    k7 = k64 / k68
+    k8 = k59 + (k57 + k61)
     k9 = k1 * 2.0
     k10 = 2.0 * k5
     k11 = -k7
     k12 = l_arm_squared / 3.0
-    k69 = l_arm * 2.0
-    k70 = m_pendulum * k69
-    k13 = 9.0 * k70 / 12.0
-    k14 = m_arm * k69 / 3.0 + k70 / 4.0
-    k15 = m_pendulum * k68 / 4.0
-    k71 = m_pendulum * l_pendulum
-    k16 = k71 / 2.0
-    k17 = -3.0 / k67
+    k70 = l_arm * 2.0
+    k71 = m_pendulum * k70
+    k13 = 9.0 * k71 / 12.0
+    k14 = m_arm * k70 / 3.0 + k71 / 4.0
+    k15 = m_pendulum * k69 / 4.0
+    k72 = m_pendulum * l_pendulum
+    k16 = k72 / 2.0
+    k17 = -3.0 / k68
     k18 = l_arm_squared / 4.0
-    k19 = k61 / 12.0
-    k20 = g * k63 / 4.0
+    k19 = k62 / 12.0
+    k20 = g * k64 / 4.0
     k21 = l_pendulum_squared * 2.0 / 3.0
     k22 = l_arm * l_pendulum / 2.0
-    k23 = m_pendulum * (4.0 * k67) / 12.0
-    k24 = k65 * k67 / 3.0
-    k25 = k66 / 2.0
-    k26 = 2.0 * k6 / k67
-    k27 = 2.0 * k7 / k67
-    k72 = J_rotor * gear
-    k28 = 2.0 * k72
-    k29 = k64 / 4.0
-    k73 = m_pendulum * l_pendulum_squared
-    pivot_phi_dot = k73 / 3.0
-    k30 = k73 * 2.0 / 3.0
+    k23 = m_pendulum * (4.0 * k68) / 12.0
+    k24 = k66 * k68 / 3.0
+    k25 = k67 / 2.0
+    k26 = 2.0 * k6 / k68
+    k27 = 2.0 * k7 / k68
+    k73 = J_rotor * gear
+    k28 = 2.0 * k73
+    k29 = k65 / 4.0
+    k74 = m_pendulum * l_pendulum_squared
+    pivot_phi_dot = k74 / 3.0
+    k30 = k74 * 2.0 / 3.0
     k31 = 1.0 / pivot_phi_dot
-    k32 = l_arm * k71 / 2.0
-    k33 = k59 + k62
-    k34 = g * k71 / 2.0
+    k32 = l_arm * k72 / 2.0
+    k33 = k60 + k63
+    k34 = g * k72 / 2.0
     k35 = -pivot_phi_dot
-    k49 = l_arm / 2.0
-    k37 = k49 + k49
+    k50 = l_arm / 2.0
+    k37 = k50 + k50
     k38 = l_pendulum / 2.0
-    moment_arm_x = m_arm * k49
-    k40 = k49 * moment_arm_x
-    k41 = gear * k72
+    moment_arm_x = m_arm * k50
+    k40 = k50 * moment_arm_x
+    k41 = gear * k73
     k42 = k38 * k38
     k43 = k37 * k37
-    k74 = m_pendulum * g
-    k44 = -k38 * k74
-    k45 = -k74
+    k46 = m_pendulum * g
+    k44 = -k38 * k46
+    k45 = -k46
     inertia_arm_yy = k36 + k40
     moment_pendulum_x = m_pendulum * k37
-    k46 = m_pendulum * k38
+    k47 = m_pendulum * k38
     inertia_pendulum_zz = k37 * moment_pendulum_x
-    k75 = k38 * k46
+    k75 = k38 * k47
     inertia_pendulum_xz = k38 * moment_pendulum_x
     inertia_pendulum_xx = k39 + k75
     inertia_pendulum_yy = k39 + (inertia_pendulum_zz + k75)
-    k47 = m_arm + m_pendulum
-    k48 = -k46
-    k50 = m_arm * g
-    k51 = -k50
-    k52 = -k36
-    k53 = -k38
-    k54 = k38 + k38
-    k55 = -k54
+    k48 = m_arm + m_pendulum
+    k49 = -k47
+    k51 = m_arm * g
+    k52 = -k51
+    k53 = -k36
+    k54 = -k38
+    k55 = k38 + k38
+    k56 = -k55
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
@@ -263,14 +264,15 @@ def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
         "kinetic_energy": (m_pendulum, k36, k37, k38, k39, k40, k41, k42, k43),
         "potential_energy": (k44,),
         "effect_powers": (k37, k38, k45),
-        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k46, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "centre_of_mass": (m_pendulum, k37, k38, moment_arm_x, k47, k48),
-        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k49, k37, k38, k39, k50, k51, k52),
-        "body_poses": (k49, k37, k38, k53),
-        "body_velocities": (k49, k37, k38),
-        "point_positions": (k37, k54, k55),
-        "point_velocities": (k37, k54),
-        "point_jacobians": (k37, k54),
+        "effect_forces": (k37, k38, k46),
+        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k47, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
+        "centre_of_mass": (m_pendulum, k37, k38, moment_arm_x, k48, k49),
+        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k50, k37, k38, k39, k51, k52, k53),
+        "body_poses": (k50, k37, k38, k54),
+        "body_velocities": (k50, k37, k38),
+        "point_positions": (k37, k55, k56),
+        "point_velocities": (k37, k55),
+        "point_jacobians": (k37, k55),
     }
 
 
@@ -588,9 +590,30 @@ def _effect_powers(y, k, u=(), extra=(), sin=sin, cos=cos):
     )
 
 
+def _effect_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """28 operations: 3 add, 3 sub, 18 mul, 2 sin, 2 cos."""
+    k37, k38, k46 = k
+    theta, phi, _, _ = y
+    tau, = u
+    sin_phi = sin(phi)
+    cos_phi = cos(phi)
+    cos_theta = cos(theta)
+    sin_theta = sin(theta)
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s40 = k46 * (k37 * sin_theta + k38 * s36)
+    s41 = k46 * (k37 * cos_theta - k38 * s35)
+    return (
+        sin_phi * (cos_phi * sin_theta * s40 + cos_phi * cos_theta * s41) - cos_phi * (s35 * s40 + s36 * s41),
+        sin_theta * s41 - cos_theta * s40,
+        tau,
+        0.0,
+    )
+
+
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """56 operations: 12 add, 4 sub, 35 mul, 1 neg, 2 sin, 2 cos."""
-    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k46, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k47, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
@@ -600,44 +623,44 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     s35 = sin_phi * sin_theta
     s36 = sin_phi * cos_theta
-    s40 = cos_phi * sin_theta
-    s41 = cos_phi * cos_theta
-    s42 = theta_dot * moment_arm_x
-    s43 = k46 * omega_pendulum_y
-    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k46
-    s45 = moment_pendulum_x * omega_pendulum_y
-    s46 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
-    s47 = inertia_pendulum_yy * omega_pendulum_y
-    s48 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
+    s42 = cos_phi * sin_theta
+    s43 = cos_phi * cos_theta
+    s44 = theta_dot * moment_arm_x
+    s45 = k47 * omega_pendulum_y
+    s46 = moment_pendulum_x * omega_pendulum_z + phi_dot * k47
+    s47 = moment_pendulum_x * omega_pendulum_y
+    s48 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
+    s49 = inertia_pendulum_yy * omega_pendulum_y
+    s50 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
     return (
-        -(sin_theta * s42 + (cos_theta * s43 + s40 * s44 + s35 * s45)),
-        cos_theta * s42 + (s41 * s44 - sin_theta * s43 + s36 * s45),
-        sin_phi * s44 - cos_phi * s45,
-        cos_theta * s46 - s40 * s47 + s35 * s48,
-        sin_theta * s46 + s41 * s47 - s36 * s48,
-        theta_dot * inertia_arm_yy + (sin_phi * s47 + cos_phi * s48),
+        -(sin_theta * s44 + (cos_theta * s45 + s42 * s46 + s35 * s47)),
+        cos_theta * s44 + (s43 * s46 - sin_theta * s45 + s36 * s47),
+        sin_phi * s46 - cos_phi * s47,
+        cos_theta * s48 - s42 * s49 + s35 * s50,
+        sin_theta * s48 + s43 * s49 - s36 * s50,
+        theta_dot * inertia_arm_yy + (sin_phi * s49 + cos_phi * s50),
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 3 add, 1 sub, 10 mul, 3 div, 2 sin, 2 cos."""
-    m_pendulum, k37, k38, moment_arm_x, k47, k48 = k
+    m_pendulum, k37, k38, moment_arm_x, k48, k49 = k
     theta, phi, _, _ = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s49 = sin(phi) * k38
-    s50 = cos_theta * moment_arm_x + m_pendulum * (k37 * cos_theta - sin_theta * s49)
-    s51 = sin_theta * moment_arm_x + m_pendulum * (k37 * sin_theta + cos_theta * s49)
+    s51 = sin(phi) * k38
+    s52 = cos_theta * moment_arm_x + m_pendulum * (k37 * cos_theta - sin_theta * s51)
+    s53 = sin_theta * moment_arm_x + m_pendulum * (k37 * sin_theta + cos_theta * s51)
     return (
-        s50 / k47,
-        s51 / k47,
-        cos(phi) * k48 / k47,
+        s52 / k48,
+        s53 / k48,
+        cos(phi) * k49 / k48,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """226 operations: 43 add, 39 sub, 133 mul, 1 div, 6 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k49, k37, k38, k39, k50, k51, k52 = k
+    m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k50, k37, k38, k39, k51, k52, k53 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
@@ -653,79 +676,79 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     s35 = sin_phi * sin_theta
     s36 = sin_phi * cos_theta
-    s52 = k37 * cos_theta
-    s53 = k37 * sin_theta
-    s40 = cos_phi * sin_theta
-    s41 = cos_phi * cos_theta
+    s54 = k37 * cos_theta
+    s55 = k37 * sin_theta
+    s42 = cos_phi * sin_theta
+    s43 = cos_phi * cos_theta
     theta_ddot_5 = (tau + sin_phi * s28) / (sin_phi * sin_phi * k1 + k2)
-    s54 = cos_phi * theta_ddot_5
-    phi_ddot = sin_phi * (s1 - k6) - k7 * s54
-    s55 = k49 * cos_theta
-    s56 = k49 * sin_theta
-    s57 = cos_phi * k38
-    s58 = phi_dot * cos_theta - s40 * omega_pendulum_y + s35 * omega_pendulum_z
-    s59 = phi_dot * sin_theta + s41 * omega_pendulum_y - s36 * omega_pendulum_z
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s61 = phi_dot * omega_pendulum_z
-    s62 = phi_dot * omega_pendulum_y
-    s63 = sin_phi * theta_ddot_5 + s61
-    s64 = s54 - s62
-    s65 = theta_dot_squared * k49
-    s66 = theta_ddot_5 * k49
-    s67 = m_arm * (cos_theta * s65 + sin_theta * s66)
-    s68 = m_arm * (cos_theta * s66 - sin_theta * s65)
-    s69 = k37 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k38 * (s61 + s63)
-    s70 = k37 * (s62 + s64) - k38 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
-    s71 = g * sin_phi + s70
-    s72 = g * cos_phi + (k37 * (s61 - s63) + k38 * (phi_dot_squared + omega_pendulum_y_squared))
-    s73 = phi_ddot * cos_theta - s40 * s63 + s35 * s64
-    s74 = phi_ddot * sin_theta + s41 * s63 - s36 * s64
-    s75 = sin_phi * s63 + cos_phi * s64
-    s76 = k39 * cos_theta
-    s77 = k39 * s40
-    s78 = k39 * sin_theta
-    s79 = k39 * s41
-    s80 = sin_phi * k39
-    s81 = cos_theta * s76 + s40 * s77
-    s82 = sin_theta * s76 - s41 * s77
-    s83 = sin_phi * s77
-    s84 = cos_theta * s78 - s40 * s79
-    s85 = sin_theta * s78 + s41 * s79
-    s86 = sin_phi * s79
-    s87 = s40 * s80
-    s88 = s41 * s80
-    s89 = sin_phi * s80
-    s90 = m_pendulum * (s35 * s72 - (cos_theta * s69 + s40 * s71))
-    s91 = m_pendulum * (s41 * s71 - sin_theta * s69 - s36 * s72)
-    s92 = m_pendulum * (sin_phi * s71 + cos_phi * s72)
-    s93 = s58 * s81 + s59 * s82 - s60 * s83
-    s94 = s58 * s84 + s59 * s85 + s60 * s86
-    s95 = s59 * s88 - s58 * s87 + s60 * s89
-    s96 = s73 * s84 + s74 * s85 + s75 * s86 + (s60 * s93 - s58 * s95)
-    s97 = s52 - k38 * s35 - s52
-    s98 = s53 + k38 * s36 - s53
-    s99 = s57 * s90 + s92 * s97
-    s100 = s73 * s81 + s74 * s82 - s75 * s83 + (s59 * s95 - s60 * s94) + (s92 * s98 + s57 * s91)
-    s101 = s74 * s88 - s73 * s87 + s75 * s89 + (s58 * s94 - s59 * s93) + (s91 * s97 - s90 * s98)
+    s56 = cos_phi * theta_ddot_5
+    phi_ddot = sin_phi * (s1 - k6) - k7 * s56
+    s57 = k50 * cos_theta
+    s58 = k50 * sin_theta
+    s59 = cos_phi * k38
+    s60 = phi_dot * cos_theta - s42 * omega_pendulum_y + s35 * omega_pendulum_z
+    s61 = phi_dot * sin_theta + s43 * omega_pendulum_y - s36 * omega_pendulum_z
+    s62 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s63 = phi_dot * omega_pendulum_z
+    s64 = phi_dot * omega_pendulum_y
+    s65 = sin_phi * theta_ddot_5 + s63
+    s66 = s56 - s64
+    s67 = theta_dot_squared * k50
+    s68 = theta_ddot_5 * k50
+    s69 = m_arm * (cos_theta * s67 + sin_theta * s68)
+    s70 = m_arm * (cos_theta * s68 - sin_theta * s67)
+    s71 = k37 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k38 * (s63 + s65)
+    s72 = k37 * (s64 + s66) - k38 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
+    s73 = g * sin_phi + s72
+    s74 = g * cos_phi + (k37 * (s63 - s65) + k38 * (phi_dot_squared + omega_pendulum_y_squared))
+    s75 = phi_ddot * cos_theta - s42 * s65 + s35 * s66
+    s76 = phi_ddot * sin_theta + s43 * s65 - s36 * s66
+    s77 = sin_phi * s65 + cos_phi * s66
+    s78 = k39 * cos_theta
+    s79 = k39 * s42
+    s80 = k39 * sin_theta
+    s81 = k39 * s43
+    s82 = sin_phi * k39
+    s83 = cos_theta * s78 + s42 * s79
+    s84 = sin_theta * s78 - s43 * s79
+    s85 = sin_phi * s79
+    s86 = cos_theta * s80 - s42 * s81
+    s87 = sin_theta * s80 + s43 * s81
+    s88 = sin_phi * s81
+    s89 = s42 * s82
+    s90 = s43 * s82
+    s91 = sin_phi * s82
+    s92 = m_pendulum * (s35 * s74 - (cos_theta * s71 + s42 * s73))
+    s93 = m_pendulum * (s43 * s73 - sin_theta * s71 - s36 * s74)
+    s94 = m_pendulum * (sin_phi * s73 + cos_phi * s74)
+    s95 = s60 * s83 + s61 * s84 - s62 * s85
+    s96 = s60 * s86 + s61 * s87 + s62 * s88
+    s97 = s61 * s90 - s60 * s89 + s62 * s91
+    s98 = s75 * s86 + s76 * s87 + s77 * s88 + (s62 * s95 - s60 * s97)
+    s99 = s54 - k38 * s35 - s54
+    s100 = s55 + k38 * s36 - s55
+    s101 = s59 * s92 + s94 * s99
+    s102 = s75 * s83 + s76 * s84 - s77 * s85 + (s61 * s97 - s62 * s96) + (s94 * s100 + s59 * s93)
+    s103 = s76 * s90 - s75 * s89 + s77 * s91 + (s60 * s96 - s61 * s95) + (s93 * s99 - s92 * s100)
     return (
-        s67 - s90,
-        -(s68 + s91),
-        k51 - s92,
-        k51 * s56 - (s100 + s53 * s92),
-        k50 * s55 - (s96 - s99 - s52 * s92),
-        theta_ddot_5 * k52 - (s55 * s68 + s56 * s67) - (s101 + (s52 * s91 - s53 * s90)),
-        -s90,
-        -s91,
+        s69 - s92,
+        -(s70 + s93),
+        k52 - s94,
+        k52 * s58 - (s102 + s55 * s94),
+        k51 * s57 - (s98 - s101 - s54 * s94),
+        theta_ddot_5 * k53 - (s57 * s70 + s58 * s69) - (s103 + (s54 * s93 - s55 * s92)),
         -s92,
-        -s100,
-        s99 - s96,
-        -s101,
+        -s93,
+        -s94,
+        -s102,
+        s101 - s98,
+        -s103,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """20 operations: 1 add, 1 sub, 11 mul, 3 neg, 2 sin, 2 cos."""
-    k49, k37, k38, k53 = k
+    k50, k37, k38, k54 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
@@ -737,11 +760,11 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
         cos_theta,
         -sin_theta,
         0.0,
-        k49 * cos_theta,
+        k50 * cos_theta,
         sin_theta,
         cos_theta,
         0.0,
-        k49 * sin_theta,
+        k50 * sin_theta,
         0.0,
         0.0,
         1.0,
@@ -757,13 +780,13 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         sin_phi,
         cos_phi,
-        cos_phi * k53,
+        cos_phi * k54,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """43 operations: 6 add, 4 sub, 27 mul, 2 neg, 2 sin, 2 cos."""
-    k49, k37, k38 = k
+    k50, k37, k38 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
@@ -773,47 +796,47 @@ def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     s35 = sin_phi * sin_theta
     s36 = sin_phi * cos_theta
-    s102 = k37 * cos_theta - k38 * s35
-    s103 = k37 * sin_theta + k38 * s36
-    s57 = cos_phi * k38
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s104 = theta_dot * k49
-    s105 = cos_phi * omega_pendulum_y
-    s106 = phi_dot * cos_theta - sin_theta * s105 + s35 * omega_pendulum_z
-    s107 = phi_dot * sin_theta + cos_theta * s105 - s36 * omega_pendulum_z
+    s104 = k37 * cos_theta - k38 * s35
+    s105 = k37 * sin_theta + k38 * s36
+    s59 = cos_phi * k38
+    s62 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s106 = theta_dot * k50
+    s107 = cos_phi * omega_pendulum_y
+    s108 = phi_dot * cos_theta - sin_theta * s107 + s35 * omega_pendulum_z
+    s109 = phi_dot * sin_theta + cos_theta * s107 - s36 * omega_pendulum_z
     return (
-        -sin_theta * s104,
-        cos_theta * s104,
+        -sin_theta * s106,
+        cos_theta * s106,
         0.0,
         0.0,
         0.0,
         theta_dot,
-        -(s57 * s107 + s103 * s60),
-        s102 * s60 + s57 * s106,
-        s103 * s106 - s102 * s107,
-        s106,
-        s107,
-        s60,
+        -(s59 * s109 + s105 * s62),
+        s104 * s62 + s59 * s108,
+        s105 * s108 - s104 * s109,
+        s108,
+        s109,
+        s62,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """12 operations: 1 add, 1 sub, 6 mul, 2 sin, 2 cos."""
-    k37, k54, k55 = k
+    k37, k55, k56 = k
     theta, phi, _, _ = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s108 = sin(phi) * k54
+    s110 = sin(phi) * k55
     return (
-        k37 * cos_theta - sin_theta * s108,
-        k37 * sin_theta + cos_theta * s108,
-        cos(phi) * k55,
+        k37 * cos_theta - sin_theta * s110,
+        k37 * sin_theta + cos_theta * s110,
+        cos(phi) * k56,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """39 operations: 6 add, 4 sub, 24 mul, 1 neg, 2 sin, 2 cos."""
-    k37, k54 = k
+    k37, k55 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
@@ -823,37 +846,37 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     s35 = sin_phi * sin_theta
     s36 = sin_phi * cos_theta
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s105 = cos_phi * omega_pendulum_y
-    s106 = phi_dot * cos_theta - sin_theta * s105 + s35 * omega_pendulum_z
-    s107 = phi_dot * sin_theta + cos_theta * s105 - s36 * omega_pendulum_z
-    s109 = k37 * cos_theta - s35 * k54
-    s110 = k37 * sin_theta + s36 * k54
-    s111 = cos_phi * k54
+    s62 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s107 = cos_phi * omega_pendulum_y
+    s108 = phi_dot * cos_theta - sin_theta * s107 + s35 * omega_pendulum_z
+    s109 = phi_dot * sin_theta + cos_theta * s107 - s36 * omega_pendulum_z
+    s111 = k37 * cos_theta - s35 * k55
+    s112 = k37 * sin_theta + s36 * k55
+    s113 = cos_phi * k55
     return (
-        -(s107 * s111 + s60 * s110),
-        s60 * s109 + s106 * s111,
-        s106 * s110 - s107 * s109,
+        -(s109 * s113 + s62 * s112),
+        s62 * s111 + s108 * s113,
+        s108 * s112 - s109 * s111,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """19 operations: 1 add, 2 sub, 10 mul, 2 neg, 2 sin, 2 cos."""
-    k37, k54 = k
+    k37, k55 = k
     theta, phi, _, _ = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s108 = sin(phi) * k54
-    s112 = k37 * cos_theta - sin_theta * s108
-    s113 = k37 * sin_theta + cos_theta * s108
-    s111 = cos(phi) * k54
+    s110 = sin(phi) * k55
+    s114 = k37 * cos_theta - sin_theta * s110
+    s115 = k37 * sin_theta + cos_theta * s110
+    s113 = cos(phi) * k55
     return (
-        -s113,
-        -sin_theta * s111,
-        s112,
-        cos_theta * s111,
+        -s115,
+        -sin_theta * s113,
+        s114,
+        cos_theta * s113,
         0.0,
-        cos_theta * s113 - sin_theta * s112,
+        cos_theta * s115 - sin_theta * s114,
     )
 
 
@@ -1176,6 +1199,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (2,), ('sin', 'cos'), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (2, 2), ('sin', 'cos'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

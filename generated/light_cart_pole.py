@@ -82,6 +82,7 @@ COST = {
     "kinetic_energy": {"add": 3, "mul": 9, "sin": 1, "cos": 1, "total": 14, "parameters": 0},
     "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
     "effect_powers": {"mul": 2, "sin": 1, "total": 3, "parameters": 3},
+    "effect_forces": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 1},
     "centre_of_mass": {"add": 2, "mul": 4, "div": 2, "sin": 1, "cos": 1, "total": 10, "parameters": 3},
     "joint_forces": {"add": 7, "sub": 5, "mul": 21, "div": 1, "neg": 3, "sin": 1, "cos": 1, "total": 39, "parameters": 5},
@@ -131,6 +132,7 @@ def _fixed(M, m, l, g):
         "kinetic_energy": (M, m, l),
         "potential_energy": (k16,),
         "effect_powers": (k16,),
+        "effect_forces": (k16,),
         "momentum": (M, m, l, k10),
         "centre_of_mass": (M, m, l, k11, k14),
         "joint_forces": (M, m, l, g, k8, k1, k17, k18),
@@ -370,6 +372,16 @@ def _effect_powers(y, k, u=(), extra=(), sin=sin):
     _, theta, _, theta_dot = y
     return (
         k16 * (theta_dot * sin(theta)),
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), sin=sin):
+    """2 operations: 1 mul, 1 sin."""
+    k16, = k
+    _, theta, _, _ = y
+    return (
+        0.0,
+        sin(theta) * k16,
     )
 
 
@@ -764,6 +776,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('sin',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 2), ('sin',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -72,6 +72,7 @@ COST = {
     "kinetic_energy": {"add": 1, "mul": 6, "sin": 1, "cos": 1, "total": 9, "parameters": 1},
     "potential_energy": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
     "effect_powers": {"mul": 2, "cos": 1, "total": 3, "parameters": 2},
+    "effect_forces": {"mul": 1, "cos": 1, "total": 2, "parameters": 2},
     "momentum": {"add": 1, "mul": 10, "sin": 1, "cos": 1, "total": 13, "parameters": 1},
     "centre_of_mass": {"mul": 2, "sin": 1, "cos": 1, "total": 4, "parameters": 1},
     "joint_forces": {"add": 1, "sub": 2, "mul": 8, "sin": 1, "cos": 1, "total": 13, "parameters": 8},
@@ -119,6 +120,7 @@ def _fixed(bob_mass, pivot_r_child_x, gravity_g):
         "kinetic_energy": (pivot_r_child_x, k7),
         "potential_energy": (k8,),
         "effect_powers": (k9,),
+        "effect_forces": (k3,),
         "momentum": (bob_mass, pivot_r_child_x, k10),
         "centre_of_mass": (k11,),
         "joint_forces": (k12, k13, k14, k15),
@@ -274,6 +276,15 @@ def _effect_powers(y, k, u=(), extra=(), cos=cos):
     theta, theta_dot = y
     return (
         theta_dot * cos(theta) * k9,
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), cos=cos):
+    """2 operations: 1 mul, 1 cos."""
+    k3, = k
+    theta, _ = y
+    return (
+        cos(theta) * k3,
     )
 
 
@@ -670,6 +681,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 1), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

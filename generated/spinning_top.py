@@ -94,6 +94,7 @@ COST = {
     "kinetic_energy": {"add": 4, "mul": 11, "total": 15, "parameters": 1},
     "potential_energy": {"add": 4, "sub": 1, "mul": 9, "div": 1, "total": 15, "parameters": 2},
     "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "total": 44, "parameters": 2},
+    "effect_forces": {"add": 7, "sub": 6, "mul": 22, "div": 1, "total": 36, "parameters": 2},
     "momentum": {"add": 15, "sub": 9, "mul": 36, "div": 1, "total": 61, "parameters": 3},
     "centre_of_mass": {"add": 5, "sub": 2, "mul": 15, "div": 4, "total": 26, "parameters": 1},
     "joint_forces": {"add": 63, "sub": 19, "mul": 131, "div": 2, "total": 215, "parameters": 15},
@@ -178,6 +179,7 @@ def _fixed(m, h, I_1, I_3, g):
         "kinetic_energy": (m, I_1, I_3, h_squared),
         "potential_energy": (k23,),
         "effect_powers": (h, k24),
+        "effect_forces": (k23,),
         "momentum": (I_3, moment_top_z, inertia_top_xx),
         "centre_of_mass": (m, moment_top_z),
         "joint_forces": (h, I_1, I_3, g, k1, k2, k3, k25, k26),
@@ -517,6 +519,27 @@ def _effect_powers(y, k, u=(), extra=()):
     s40 = tip_wx * (s34 + s36) + tip_wy * (1.0 - (tip_qx * s31 + s35)) + tip_wz * s38
     return (
         k24 * (h * s38 * s39 - h * s37 * s40),
+    )
+
+
+def _effect_forces(y, k, u=(), extra=()):
+    """36 operations: 7 add, 6 sub, 22 mul, 1 div."""
+    k23, = k
+    tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
+    s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s33 = tip_qz * s30
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s37 = tip_qw * s32 + tip_qz * s31
+    s38 = tip_qz * s32 - tip_qw * s31
+    return (
+        k23 * (s37 * (s34 + s36) - (1.0 - (tip_qy * s32 + s35)) * s38),
+        k23 * (s37 * (1.0 - (tip_qx * s31 + s35)) - (s36 - s34) * s38),
+        0.0,
     )
 
 
@@ -1132,6 +1155,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), (), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 3), (), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -112,6 +112,7 @@ COST = {
     "kinetic_energy": {"add": 20, "sub": 6, "mul": 36, "div": 1, "total": 63, "parameters": 0},
     "potential_energy": {"total": 0, "parameters": 0},
     "effect_powers": {"total": 0, "parameters": 0},
+    "effect_forces": {"total": 0, "parameters": 0},
     "momentum": {"add": 30, "sub": 9, "mul": 55, "div": 1, "total": 95, "parameters": 0},
     "centre_of_mass": {"mul": 3, "div": 3, "total": 6, "parameters": 0},
     "joint_forces": {"total": 0, "parameters": 0},
@@ -173,6 +174,7 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
         "kinetic_energy": (I_1, I_2, I_3, m),
         "potential_energy": (),
         "effect_powers": (),
+        "effect_forces": (),
         "momentum": (I_1, I_2, I_3, m),
         "centre_of_mass": (m,),
         "joint_forces": (),
@@ -691,6 +693,12 @@ def _potential_energy(y, k, u=(), extra=()):
 
 
 def _effect_powers(y, k, u=(), extra=()):
+    """0 operations."""
+    return (
+    )
+
+
+def _effect_forces(y, k, u=(), extra=()):
     """0 operations."""
     return (
     )
@@ -1252,6 +1260,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (0,), (), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (0, 6), (), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

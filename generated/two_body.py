@@ -102,6 +102,7 @@ COST = {
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "effect_powers": {"add": 4, "sub": 1, "mul": 6, "cos": 2, "total": 13, "parameters": 3},
+    "effect_forces": {"add": 1, "sub": 1, "mul": 2, "neg": 1, "cos": 2, "total": 7, "parameters": 7},
     "momentum": {"add": 13, "sub": 4, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
     "joint_forces": {"add": 9, "sub": 2, "mul": 24, "div": 1, "sin": 3, "cos": 3, "total": 42, "parameters": 34},
@@ -123,116 +124,119 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
         return "inertia_com of B is negative"
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k61 = m_A * m_B
-    k62 = l_B_squared * k61
-    k63 = k62 / mass_A
-    pivot_B = I_B + k63
-    k64 = k62 + I_B * mass_A
-    k65 = m_A * I_A
-    k66 = I_A * m_B
-    k67 = m_B * k65
+    k62 = m_A * m_B
+    k63 = l_B_squared * k62
+    k64 = k63 / mass_A
+    pivot_B = I_B + k64
+    k65 = k63 + I_B * mass_A
+    k66 = m_A * I_A
+    k67 = I_A * m_B
+    k68 = m_B * k66
     l_A_squared = l_A * l_A
-    k68 = I_B * k61
-    k69 = k65 + k66
-    k70 = l_A_squared * k68 + (l_B_squared * k67 + I_B * k69)
-    k1 = k70 / k64
+    k69 = I_B * k62
+    k70 = k66 + k67
+    k71 = l_A_squared * k69 + (l_B_squared * k68 + I_B * k70)
+    k1 = k71 / k65
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k71 = l_B_squared * l_A_squared
-    k72 = m_A_squared * k71
-    k73 = m_B_squared * k72
-    k2 = k73 / (mass_A * k64)
-    k74 = l_A * k61
-    k3 = l_B * k74 / mass_A
+    k72 = l_B_squared * l_A_squared
+    k73 = m_A_squared * k72
+    k74 = m_B_squared * k73
+    k2 = k74 / (mass_A * k65)
+    k75 = l_A * k62
+    k3 = l_B * k75 / mass_A
     k4 = 1.0 / pivot_B
     k9 = m_B * l_A
     k5 = k9 / mass_A
-    k10 = m_B * l_B
-    k6 = k10 / mass_A
+    moment_B_x = m_B * l_B
+    k6 = moment_B_x / mass_A
     k7 = k2 * 2.0
     k8 = 1.0 / mass_A
-    k11 = g * mass_A
-    k75 = m_B * l_B_squared
-    k12 = l_B * k9
-    k13 = I_B + k75
-    k14 = 2.0 * (m_B * (l_A * l_B))
-    k15 = I_B + (I_A + (k75 + m_B * l_A_squared))
-    k16 = g * k9
-    k17 = g * k10
-    k18 = -k9
-    k27 = m_A * g
-    k28 = m_B * g
-    k19 = k27 + k28
-    k20 = l_A * k28
-    k21 = l_B * k28
-    k22 = l_A * k10
-    k23 = I_A / 2.0
-    k24 = I_B / 2.0
-    k25 = m_A / 2.0
-    k26 = m_B / 2.0
-    k29 = -k27
-    k30 = k74 / mass_A
-    k31 = l_B * k61 / mass_A
-    k76 = m_A * I_B
-    k77 = m_B * I_B
-    k78 = k62 + (k76 + k77)
-    k32 = k70 / k78
-    k79 = mass_A * k78
-    k33 = k73 / k79
-    k34 = k3 * k3
-    k35 = k3 * k4
-    k80 = I_A * I_B
-    k36 = (k77 * l_A_squared + (k80 + l_B_squared * k66) - k32 * k13) / k78
-    k37 = (m_B_squared * (k71 * (m_A * 2.0)) - k33 * (k78 + mass_A * k13)) / k79
-    k38 = (k12 - k3) / mass_A
-    k39 = k4 * ((k75 - k63) / mass_A) / pivot_B
-    k40 = k5 / mass_A
-    k41 = k6 / mass_A
-    k42 = k78 / k78
-    k43 = k35 * k6
-    k81 = m_A * l_B_squared
-    k82 = I_B + k81
-    k44 = (k76 * l_A_squared + (k80 + l_B_squared * k65) - k32 * k82) / k78
-    k45 = (k72 * (m_B * 2.0) - k33 * (k78 + mass_A * k82)) / k79
-    k46 = (l_B * (m_A * l_A) - k3) / mass_A
-    k47 = k4 * ((k81 - k63) / mass_A) / pivot_B
-    k48 = (l_A - k5) / mass_A
-    k49 = (l_B - k6) / mass_A
-    k50 = (k69 + k61 * l_A_squared - mass_A * k32) / k78
-    k51 = k33 * (mass_A * mass_A) / k79
-    k52 = k4 / pivot_B
-    k83 = l_A * 2.0
-    k53 = k68 * k83 / k78
-    k84 = m_A_squared * m_B_squared
-    k54 = k83 * (l_B_squared * k84) / k79
-    k55 = m_B / mass_A
-    k56 = k4 * k6
-    k57 = -k4
-    k85 = l_B * 2.0
-    k86 = k61 * k85
-    k58 = (k67 * k85 - k32 * k86) / k78
-    k59 = (k85 * (l_A_squared * k84) - k33 * (mass_A * k86)) / k79
-    k60 = k4 * (k86 / mass_A) / pivot_B
+    k10 = g * mass_A
+    k76 = m_B * l_B_squared
+    k11 = l_B * k9
+    k12 = I_B + k76
+    k13 = 2.0 * (m_B * (l_A * l_B))
+    k14 = I_B + (I_A + (k76 + m_B * l_A_squared))
+    k15 = g * k9
+    k16 = g * moment_B_x
+    k17 = -k9
+    k26 = m_A * g
+    k27 = m_B * g
+    k18 = k26 + k27
+    k19 = l_A * k27
+    k20 = l_B * k27
+    k21 = l_A * moment_B_x
+    k22 = I_A / 2.0
+    k23 = I_B / 2.0
+    k24 = m_A / 2.0
+    k25 = m_B / 2.0
+    k28 = -k26
+    k29 = -k19
+    k30 = -k18
+    k31 = k75 / mass_A
+    k32 = l_B * k62 / mass_A
+    k77 = m_A * I_B
+    k78 = m_B * I_B
+    k79 = k63 + (k77 + k78)
+    k33 = k71 / k79
+    k80 = mass_A * k79
+    k34 = k74 / k80
+    k35 = k3 * k3
+    k36 = k3 * k4
+    k81 = I_A * I_B
+    k37 = (k78 * l_A_squared + (k81 + l_B_squared * k67) - k33 * k12) / k79
+    k38 = (m_B_squared * (k72 * (m_A * 2.0)) - k34 * (k79 + mass_A * k12)) / k80
+    k39 = (k11 - k3) / mass_A
+    k40 = k4 * ((k76 - k64) / mass_A) / pivot_B
+    k41 = k5 / mass_A
+    k42 = k6 / mass_A
+    k43 = k79 / k79
+    k44 = k36 * k6
+    k82 = m_A * l_B_squared
+    k83 = I_B + k82
+    k45 = (k77 * l_A_squared + (k81 + l_B_squared * k66) - k33 * k83) / k79
+    k46 = (k73 * (m_B * 2.0) - k34 * (k79 + mass_A * k83)) / k80
+    k47 = (l_B * (m_A * l_A) - k3) / mass_A
+    k48 = k4 * ((k82 - k64) / mass_A) / pivot_B
+    k49 = (l_A - k5) / mass_A
+    k50 = (l_B - k6) / mass_A
+    k51 = (k70 + k62 * l_A_squared - mass_A * k33) / k79
+    k52 = k34 * (mass_A * mass_A) / k80
+    k53 = k4 / pivot_B
+    k84 = l_A * 2.0
+    k54 = k69 * k84 / k79
+    k85 = m_A_squared * m_B_squared
+    k55 = k84 * (l_B_squared * k85) / k80
+    k56 = m_B / mass_A
+    k57 = k4 * k6
+    k58 = -k4
+    k86 = l_B * 2.0
+    k87 = k62 * k86
+    k59 = (k68 * k86 - k33 * k87) / k79
+    k60 = (k86 * (l_A_squared * k85) - k34 * (mass_A * k87)) / k80
+    k61 = k4 * (k87 / mass_A) / pivot_B
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6),
         "jacobian": (k1, k2, k3, k4, k5, k6, k7),
         "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k8),
-        "inverse_dynamics": (mass_A, k9, k10, k11, k12, k13, k14, k15, k16, k17),
-        "mass_matrix": (mass_A, k9, k10, k12, k13, k14, k15, k18),
-        "velocity_force": (k9, k10, k12),
-        "gravity_force": (k19, k20, k21),
-        "bias_force": (k9, k10, k11, k20, k21, k22),
+        "inverse_dynamics": (mass_A, k9, moment_B_x, k10, k11, k12, k13, k14, k15, k16),
+        "mass_matrix": (mass_A, k9, moment_B_x, k11, k12, k13, k14, k17),
+        "velocity_force": (k9, moment_B_x, k11),
+        "gravity_force": (k18, k19, k20),
+        "bias_force": (k9, moment_B_x, k10, k19, k20, k21),
         "applied_force": (),
-        "kinetic_energy": (l_A, l_B, k23, k24, k25, k26),
-        "potential_energy": (l_A, l_B, k27, k28),
-        "effect_powers": (l_A, l_B, k28, k29),
+        "kinetic_energy": (l_A, l_B, k22, k23, k24, k25),
+        "potential_energy": (l_A, l_B, k26, k27),
+        "effect_powers": (l_A, l_B, k27, k28),
+        "effect_forces": (k20, k29, k30),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k8),
-        "joint_forces": (k1, k2, k3, k4, k30, k31),
+        "joint_forces": (k1, k2, k3, k4, k31, k32),
         "body_poses": (l_A, l_B),
         "body_velocities": (l_A, l_B),
-        "parameter_jacobian": (k3, k4, k5, k6, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60),
+        "parameter_jacobian": (k3, k4, k5, k6, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61),
     }
 
 
@@ -285,28 +289,28 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k3
-    s3 = theta_dot_squared * s2
+    s1 = sin_phi * k3
+    s2 = theta_dot_squared * s1
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    alpha_A = (k4 * (coupling_B_A * s3) + s2 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
-    s4 = k4 * (s3 + coupling_B_A * alpha_A)
-    s5 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_theta_phi * omega_B_squared + cos_theta_phi * s4)
+    alpha_A = (k4 * (coupling_B_A * s2) + s1 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
+    s3 = k4 * (s2 + coupling_B_A * alpha_A)
+    s4 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_angle_B * omega_B_squared + cos_angle_B * s3)
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s4),
-        s5 - g,
+        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_angle_B * omega_B_squared - sin_angle_B * s3),
+        s4 - g,
         alpha_A,
-        -(alpha_A + s4),
+        -(alpha_A + s3),
     )
 
 
@@ -318,39 +322,39 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     pivot_A = k1 + sin_phi * sin_phi * k2
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k3
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k3
-    s3 = theta_dot_squared * s2
+    s1 = sin_phi * k3
+    s2 = theta_dot_squared * s1
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s6 = cos_theta_phi * omega_B_squared
-    s7 = sin_theta_phi * omega_B_squared
-    s8 = coupling_B_A * k4
-    alpha_A_2 = (s3 * s8 + s2 * omega_B_squared) / pivot_A
-    s9 = k4 * (s3 + coupling_B_A * alpha_A_2)
-    s10 = sin_theta_phi * s9
-    s11 = cos_theta_phi * s9
-    s12 = coupling_B_A * theta_dot_squared
-    s13 = k4 * (coupling_B_A * s12 - s2 * s3) + coupling_B_A * omega_B_squared - alpha_A_2 * (sin_phi * cos_phi * k7)
-    s14 = s13 / pivot_A
-    s15 = k4 * (s12 + (coupling_B_A * s14 - s2 * alpha_A_2))
-    s16 = sin_theta * k5
-    s17 = cos_theta * k5
-    s18 = theta_dot * 2.0
-    s19 = s2 * s18
-    s20 = omega_B * 2.0
-    s21 = s2 * s20
-    s22 = (s8 * s19 + s21) / pivot_A
-    s23 = k4 * (s19 + coupling_B_A * s22)
-    s24 = cos_theta_phi * s20
-    s25 = sin_theta_phi * s20
-    s26 = s21 / pivot_A
-    s27 = s8 * s26
+    s5 = cos_angle_B * omega_B_squared
+    s6 = sin_angle_B * omega_B_squared
+    s7 = coupling_B_A * k4
+    alpha_A_2 = (s2 * s7 + s1 * omega_B_squared) / pivot_A
+    s8 = k4 * (s2 + coupling_B_A * alpha_A_2)
+    s9 = sin_angle_B * s8
+    s10 = cos_angle_B * s8
+    s11 = coupling_B_A * theta_dot_squared
+    s12 = k4 * (coupling_B_A * s11 - s1 * s2) + coupling_B_A * omega_B_squared - alpha_A_2 * (sin_phi * cos_phi * k7)
+    s13 = s12 / pivot_A
+    s14 = k4 * (s11 + (coupling_B_A * s13 - s1 * alpha_A_2))
+    s15 = sin_theta * k5
+    s16 = cos_theta * k5
+    s17 = theta_dot * 2.0
+    s18 = s1 * s17
+    s19 = omega_B * 2.0
+    s20 = s1 * s19
+    s21 = (s7 * s18 + s20) / pivot_A
+    s22 = k4 * (s18 + coupling_B_A * s21)
+    s23 = cos_angle_B * s19
+    s24 = sin_angle_B * s19
+    s25 = s20 / pivot_A
+    s26 = s7 * s25
     return (
         0.0,
         0.0,
@@ -386,36 +390,36 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         1.0,
         0.0,
         0.0,
-        k5 * (cos_theta * alpha_A_2 - theta_dot_squared * sin_theta) - k6 * (s7 + s11),
-        s14 * s16 - k6 * (s7 + (s11 + sin_theta_phi * s15)),
+        k5 * (cos_theta * alpha_A_2 - theta_dot_squared * sin_theta) - k6 * (s6 + s10),
+        s13 * s15 - k6 * (s6 + (s10 + sin_angle_B * s14)),
         0.0,
         0.0,
-        k5 * (sin_theta * s22 + cos_theta * s18) + k6 * (s24 - sin_theta_phi * s23),
-        s16 * s26 + k6 * (s24 - sin_theta_phi * s27),
+        k5 * (sin_theta * s21 + cos_theta * s17) + k6 * (s23 - sin_angle_B * s22),
+        s15 * s25 + k6 * (s23 - sin_angle_B * s26),
         0.0,
         0.0,
-        k5 * (sin_theta * alpha_A_2 + theta_dot_squared * cos_theta) + k6 * (s6 - s10),
-        k6 * (s6 + (cos_theta_phi * s15 - s10)) - s14 * s17,
+        k5 * (sin_theta * alpha_A_2 + theta_dot_squared * cos_theta) + k6 * (s5 - s9),
+        k6 * (s5 + (cos_angle_B * s14 - s9)) - s13 * s16,
         0.0,
         0.0,
-        k5 * (sin_theta * s18 - cos_theta * s22) + k6 * (s25 + cos_theta_phi * s23),
-        k6 * (s25 + cos_theta_phi * s27) - s17 * s26,
-        0.0,
-        0.0,
-        0.0,
-        s14,
-        0.0,
-        0.0,
-        s22,
-        s26,
+        k5 * (sin_theta * s17 - cos_theta * s21) + k6 * (s24 + cos_angle_B * s22),
+        k6 * (s24 + cos_angle_B * s26) - s16 * s25,
         0.0,
         0.0,
         0.0,
-        -(s14 + s15),
+        s13,
         0.0,
         0.0,
-        -(s22 + s23),
-        -(s26 + s27),
+        s21,
+        s25,
+        0.0,
+        0.0,
+        0.0,
+        -(s13 + s14),
+        0.0,
+        0.0,
+        -(s21 + s22),
+        -(s25 + s26),
     )
 
 
@@ -426,24 +430,24 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     tau__x_A, tau__y_A, tau__theta, tau__phi = extra
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k3
+    s1 = sin_phi * k3
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    load_B = tau__phi + k6 * (tau__x_A * sin_theta_phi - tau__y_A * cos_theta_phi) - theta_dot_squared * s2
-    s28 = s2 * omega_B_squared + (tau__theta + k5 * (tau__x_A * sin_theta - tau__y_A * cos_theta))
-    alpha_A_3 = (s28 - tau__phi - k4 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
+    load_B = tau__phi + k6 * (tau__x_A * sin_angle_B - tau__y_A * cos_angle_B) - theta_dot_squared * s1
+    s27 = s1 * omega_B_squared + (tau__theta + k5 * (tau__x_A * sin_theta - tau__y_A * cos_theta))
+    alpha_A_3 = (s27 - tau__phi - k4 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k4 * (load_B - coupling_B_A * alpha_A_3)
-    s29 = tau__x_A * k8 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
-    s30 = tau__y_A * k8 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
+    s28 = tau__x_A * k8 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
+    s29 = tau__y_A * k8 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
     return (
-        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B) + s29,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s30 - g,
+        k6 * (cos_angle_B * omega_B_squared + sin_angle_B * alpha_B) + s28,
+        k6 * (sin_angle_B * omega_B_squared - cos_angle_B * alpha_B) + s29 - g,
         alpha_A_3,
         alpha_B - alpha_A_3,
     )
@@ -451,119 +455,119 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """70 operations: 19 add, 8 sub, 37 mul, 3 sin, 3 cos."""
-    mass_A, k9, k10, k11, k12, k13, k14, k15, k16, k17 = k
+    mass_A, k9, moment_B_x, k10, k11, k12, k13, k14, k15, k16 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     x_A_ddot, y_A_ddot, theta_ddot, phi_ddot = extra
     sin_phi = sin(phi)
     cos_phi = cos(phi)
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s31 = sin_phi * theta_dot_squared
-    s32 = sin_theta * k9 + sin_theta_phi * k10
-    s33 = x_A_ddot * mass_A - theta_ddot * s32 - k9 * (theta_dot_squared * cos_theta)
-    s34 = cos_theta * k9 + cos_theta_phi * k10
-    s35 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (theta_ddot * s34 + y_A_ddot * mass_A)
-    s36 = cos_phi * k12 + k13
-    s37 = cos_theta_phi * k17
-    s38 = y_A_ddot * s34 + (phi_ddot * s36 + theta_ddot * (cos_phi * k14 + k15)) + cos_theta * k16
-    s39 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s37 + (theta_ddot * s36 + phi_ddot * k13))
+    s30 = sin_phi * theta_dot_squared
+    s31 = sin_theta * k9 + sin_angle_B * moment_B_x
+    s32 = x_A_ddot * mass_A - theta_ddot * s31 - k9 * (theta_dot_squared * cos_theta)
+    s33 = cos_theta * k9 + cos_angle_B * moment_B_x
+    s34 = moment_B_x * (phi_ddot * cos_angle_B - sin_angle_B * omega_B_squared) + (theta_ddot * s33 + y_A_ddot * mass_A)
+    s35 = cos_phi * k11 + k12
+    s36 = cos_angle_B * k16
+    s37 = y_A_ddot * s33 + (phi_ddot * s35 + theta_ddot * (cos_phi * k13 + k14)) + cos_theta * k15
+    s38 = moment_B_x * (y_A_ddot * cos_angle_B - x_A_ddot * sin_angle_B) + (s36 + (theta_ddot * s35 + phi_ddot * k12))
     return (
-        s33 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        k11 + s35 - k9 * (theta_dot_squared * sin_theta),
-        k12 * (s31 - sin_phi * omega_B_squared) + (s37 + s38) - x_A_ddot * s32,
-        s31 * k12 + s39,
+        s32 - moment_B_x * (cos_angle_B * omega_B_squared + phi_ddot * sin_angle_B),
+        k10 + s34 - k9 * (theta_dot_squared * sin_theta),
+        k11 * (s30 - sin_phi * omega_B_squared) + (s36 + s37) - x_A_ddot * s31,
+        s30 * k11 + s38,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     """17 operations: 4 add, 1 sub, 6 mul, 1 neg, 2 sin, 3 cos."""
-    mass_A, k9, k10, k12, k13, k14, k15, k18 = k
+    mass_A, k9, moment_B_x, k11, k12, k13, k14, k17 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
-    s1 = theta + phi
-    s40 = sin(s1) * k10
-    s41 = cos(s1) * k10
-    s34 = cos(theta) * k9 + s41
-    s36 = cos_phi * k12 + k13
-    s42 = -s40
-    s43 = sin(theta) * k18 - s40
+    angle_B = theta + phi
+    s39 = sin(angle_B) * moment_B_x
+    s40 = cos(angle_B) * moment_B_x
+    s33 = cos(theta) * k9 + s40
+    s35 = cos_phi * k11 + k12
+    s41 = -s39
+    s42 = sin(theta) * k17 - s39
     return (
         mass_A,
         0.0,
-        s43,
         s42,
+        s41,
         0.0,
         mass_A,
-        s34,
-        s41,
-        s43,
-        s34,
-        cos_phi * k14 + k15,
-        s36,
+        s33,
+        s40,
         s42,
+        s33,
+        cos_phi * k13 + k14,
+        s35,
         s41,
-        s36,
-        k13,
+        s40,
+        s35,
+        k12,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """23 operations: 4 add, 1 sub, 11 mul, 2 neg, 3 sin, 2 cos."""
-    k9, k10, k12 = k
+    k9, moment_B_x, k11 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     theta_dot_squared = theta_dot * theta_dot
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s44 = theta_dot_squared * k9
-    s45 = sin(phi) * k12
-    s46 = omega_B_squared * k10
+    s43 = theta_dot_squared * k9
+    s44 = sin(phi) * k11
+    s45 = omega_B_squared * moment_B_x
     return (
-        -(cos(theta) * s44 + cos(s1) * s46),
-        -(sin(theta) * s44 + sin(s1) * s46),
-        (theta_dot_squared - omega_B_squared) * s45,
-        theta_dot_squared * s45,
+        -(cos(theta) * s43 + cos(angle_B) * s45),
+        -(sin(theta) * s43 + sin(angle_B) * s45),
+        (theta_dot_squared - omega_B_squared) * s44,
+        theta_dot_squared * s44,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k19, k20, k21 = k
+    k18, k19, k20 = k
     _, _, theta, phi, _, _, _, _ = y
-    s47 = cos(theta + phi) * k21
+    s46 = cos(theta + phi) * k20
     return (
         0.0,
-        k19,
-        cos(theta) * k20 + s47,
-        s47,
+        k18,
+        cos(theta) * k19 + s46,
+        s46,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """28 operations: 6 add, 3 sub, 13 mul, 1 neg, 3 sin, 2 cos."""
-    k9, k10, k11, k20, k21, k22 = k
+    k9, moment_B_x, k10, k19, k20, k21 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s44 = theta_dot_squared * k9
-    s46 = omega_B_squared * k10
-    s47 = cos_theta_phi * k21
-    s48 = sin(phi) * k22
+    s43 = theta_dot_squared * k9
+    s45 = omega_B_squared * moment_B_x
+    s46 = cos_angle_B * k20
+    s47 = sin(phi) * k21
     return (
-        -(cos_theta * s44 + cos_theta_phi * s46),
-        k11 - sin(theta) * s44 - sin(s1) * s46,
-        (theta_dot_squared - omega_B_squared) * s48 + (cos_theta * k20 + s47),
-        s47 + theta_dot_squared * s48,
+        -(cos_theta * s43 + cos_angle_B * s45),
+        k10 - sin(theta) * s43 - sin(angle_B) * s45,
+        (theta_dot_squared - omega_B_squared) * s47 + (cos_theta * k19 + s46),
+        s46 + theta_dot_squared * s47,
     )
 
 
@@ -579,36 +583,49 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     """31 operations: 9 add, 2 sub, 16 mul, 2 sin, 2 cos."""
-    l_A, l_B, k23, k24, k25, k26 = k
+    l_A, l_B, k22, k23, k24, k25 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     omega_B = theta_dot + phi_dot
-    s49 = l_A * theta_dot
-    s50 = l_B * omega_B
-    xd_B = x_A_dot - sin(theta) * s49 - sin(s1) * s50
-    yd_B = cos(s1) * s50 + (y_A_dot + cos(theta) * s49)
-    s51 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k25 + (theta_dot * theta_dot * k23 + omega_B * omega_B * k24)
+    s48 = l_A * theta_dot
+    s49 = l_B * omega_B
+    xd_B = x_A_dot - sin(theta) * s48 - sin(angle_B) * s49
+    yd_B = cos(angle_B) * s49 + (y_A_dot + cos(theta) * s48)
+    s50 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k24 + (theta_dot * theta_dot * k22 + omega_B * omega_B * k23)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k26 + s51,
+        (xd_B * xd_B + yd_B * yd_B) * k25 + s50,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k27, k28 = k
+    l_A, l_B, k26, k27 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k27 + k28 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k26 + k27 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
     """13 operations: 4 add, 1 sub, 6 mul, 2 cos."""
-    l_A, l_B, k28, k29 = k
+    l_A, l_B, k27, k28 = k
     _, _, theta, phi, _, y_A_dot, theta_dot, phi_dot = y
     yd_B_2 = l_B * (cos(theta + phi) * (theta_dot + phi_dot)) + (y_A_dot + l_A * (theta_dot * cos(theta)))
     return (
-        y_A_dot * k29 - k28 * yd_B_2,
+        y_A_dot * k28 - k27 * yd_B_2,
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), cos=cos):
+    """7 operations: 1 add, 1 sub, 2 mul, 1 neg, 2 cos."""
+    k20, k29, k30 = k
+    _, _, theta, phi, _, _, _, _ = y
+    s46 = cos(theta + phi) * k20
+    return (
+        0.0,
+        k30,
+        cos(theta) * k29 - s46,
+        -s46,
     )
 
 
@@ -616,21 +633,21 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """42 operations: 13 add, 4 sub, 21 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
-    s49 = l_A * theta_dot
-    s52 = l_B * sin(s1)
-    xd_B_2 = x_A_dot - sin_theta * s49 - omega_B * s52
-    s53 = l_B * cos(s1)
-    yd_B_3 = omega_B * s53 + (y_A_dot + cos_theta * s49)
-    s54 = yd_B_3 * (s53 + (x_A + l_A * cos_theta)) - xd_B_2 * (s52 + (y_A + l_A * sin_theta))
-    s55 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s48 = l_A * theta_dot
+    s51 = l_B * sin(angle_B)
+    xd_B_2 = x_A_dot - sin_theta * s48 - omega_B * s51
+    s52 = l_B * cos(angle_B)
+    yd_B_3 = omega_B * s52 + (y_A_dot + cos_theta * s48)
+    s53 = yd_B_3 * (s52 + (x_A + l_A * cos_theta)) - xd_B_2 * (s51 + (y_A + l_A * sin_theta))
+    s54 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B_2,
         m_A * y_A_dot + m_B * yd_B_3,
-        m_B * s54 + s55,
+        m_B * s53 + s54,
     )
 
 
@@ -638,34 +655,34 @@ def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
     m_A, m_B, l_A, l_B, k8 = k
     x_A, y_A, theta, phi, _, _, _, _ = y
-    s1 = theta + phi
+    angle_B = theta + phi
     return (
-        k8 * (m_A * x_A + m_B * (l_B * cos(s1) + (x_A + l_A * cos(theta)))),
-        k8 * (m_A * y_A + m_B * (l_B * sin(s1) + (y_A + l_A * sin(theta)))),
+        k8 * (m_A * x_A + m_B * (l_B * cos(angle_B) + (x_A + l_A * cos(theta)))),
+        k8 * (m_A * y_A + m_B * (l_B * sin(angle_B) + (y_A + l_A * sin(theta)))),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """42 operations: 9 add, 2 sub, 24 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k30, k31 = k
+    k1, k2, k3, k4, k31, k32 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k3
-    s3 = theta_dot_squared * s2
+    s1 = sin_phi * k3
+    s2 = theta_dot_squared * s1
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    alpha_A = (k4 * (coupling_B_A * s3) + s2 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
-    s4 = k4 * (s3 + coupling_B_A * alpha_A)
+    alpha_A = (k4 * (coupling_B_A * s2) + s1 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
+    s3 = k4 * (s2 + coupling_B_A * alpha_A)
     return (
-        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s4) * k31,
-        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s4) * k31,
+        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k31 + (cos_angle_B * omega_B_squared - sin_angle_B * s3) * k32,
+        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k31 + (sin_angle_B * omega_B_squared + cos_angle_B * s3) * k32,
         0.0,
     )
 
@@ -674,14 +691,14 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     x_A, y_A, theta, phi, _, _, _, _ = y
-    s1 = theta + phi
+    angle_B = theta + phi
     return (
         x_A,
         y_A,
         theta,
-        l_B * cos(s1) + (x_A + l_A * cos(theta)),
-        l_B * sin(s1) + (y_A + l_A * sin(theta)),
-        s1,
+        l_B * cos(angle_B) + (x_A + l_A * cos(theta)),
+        l_B * sin(angle_B) + (y_A + l_A * sin(theta)),
+        angle_B,
     )
 
 
@@ -689,72 +706,72 @@ def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """16 operations: 4 add, 2 sub, 6 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     omega_B = theta_dot + phi_dot
-    s49 = l_A * theta_dot
-    s50 = l_B * omega_B
+    s48 = l_A * theta_dot
+    s49 = l_B * omega_B
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
-        x_A_dot - sin(theta) * s49 - sin(s1) * s50,
-        cos(s1) * s50 + (y_A_dot + cos(theta) * s49),
+        x_A_dot - sin(theta) * s48 - sin(angle_B) * s49,
+        cos(angle_B) * s49 + (y_A_dot + cos(theta) * s48),
         omega_B,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     """207 operations: 44 add, 28 sub, 117 mul, 7 div, 5 neg, 3 sin, 3 cos."""
-    k3, k4, k5, k6, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60 = k
+    k3, k4, k5, k6, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
-    s56 = sin_phi * sin_phi
+    s55 = sin_phi * sin_phi
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k3
-    s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s16 = sin_theta * k5
-    s17 = cos_theta * k5
-    s31 = sin_phi * theta_dot_squared
-    s57 = sin_phi * omega_B_squared
-    pivot_A_2 = k32 + s56 * k33
-    s58 = cos_phi * s31
-    s59 = k3 * s58
-    alpha_A_4 = (k35 * s59 + k3 * s57) / pivot_A_2
-    s60 = k3 * s31 + coupling_B_A * alpha_A_4
-    s61 = k4 * s60
-    s62 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
-    s63 = cos_theta_phi * omega_B_squared - sin_theta_phi * s61
-    s64 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
-    s65 = sin_theta_phi * omega_B_squared + cos_theta_phi * s61
-    s66 = s59 * k38
-    s67 = k34 * s58
-    s68 = (k4 * (s66 + s66) - k39 * s67 + s57 * k38 - alpha_A_4 * (k36 + s56 * k37)) / pivot_A_2
-    s69 = cos_phi * alpha_A_4
-    s70 = k4 * (s31 * k38 + (k38 * s69 + coupling_B_A * s68)) - s60 * k39
-    s71 = sin_theta_phi * k6
-    s72 = cos_theta_phi * k6
-    s73 = alpha_A_4 * k42 / pivot_A_2
-    s74 = cos_phi * s73
-    s75 = s74 * k43
-    s76 = s59 * k46
-    s77 = (k4 * (s76 + s76) - s67 * k47 + s57 * k46 - alpha_A_4 * (k44 + s56 * k45)) / pivot_A_2
-    s78 = k4 * (s31 * k46 + (s69 * k46 + coupling_B_A * s77)) - s60 * k47
-    s79 = (s67 * k52 + alpha_A_4 * (k50 - s56 * k51)) / pivot_A_2
-    s80 = s60 * k52 + k35 * (cos_phi * s79)
-    s81 = s59 * k31
-    s82 = (k4 * (s81 + s81) + s57 * k31 - alpha_A_4 * (k53 + s56 * k54)) / pivot_A_2
-    s83 = s31 * k31 + (k31 * s69 + coupling_B_A * s82)
-    s84 = s83 * k56
-    s85 = s59 * k30
-    s86 = (k4 * (s85 + s85) - s67 * k60 + s57 * k30 - alpha_A_4 * (k58 + s56 * k59)) / pivot_A_2
-    s87 = k4 * (s31 * k30 + (k30 * s69 + coupling_B_A * s86)) - s60 * k60
+    s15 = sin_theta * k5
+    s16 = cos_theta * k5
+    s30 = sin_phi * theta_dot_squared
+    s56 = sin_phi * omega_B_squared
+    pivot_A_2 = k33 + s55 * k34
+    s57 = cos_phi * s30
+    s58 = k3 * s57
+    alpha_A_4 = (k36 * s58 + k3 * s56) / pivot_A_2
+    s59 = k3 * s30 + coupling_B_A * alpha_A_4
+    s60 = k4 * s59
+    s61 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
+    s62 = cos_angle_B * omega_B_squared - sin_angle_B * s60
+    s63 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
+    s64 = sin_angle_B * omega_B_squared + cos_angle_B * s60
+    s65 = s58 * k39
+    s66 = k35 * s57
+    s67 = (k4 * (s65 + s65) - k40 * s66 + s56 * k39 - alpha_A_4 * (k37 + s55 * k38)) / pivot_A_2
+    s68 = cos_phi * alpha_A_4
+    s69 = k4 * (s30 * k39 + (k39 * s68 + coupling_B_A * s67)) - s59 * k40
+    s70 = sin_angle_B * k6
+    s71 = cos_angle_B * k6
+    s72 = alpha_A_4 * k43 / pivot_A_2
+    s73 = cos_phi * s72
+    s74 = s73 * k44
+    s75 = s58 * k47
+    s76 = (k4 * (s75 + s75) - s66 * k48 + s56 * k47 - alpha_A_4 * (k45 + s55 * k46)) / pivot_A_2
+    s77 = k4 * (s30 * k47 + (s68 * k47 + coupling_B_A * s76)) - s59 * k48
+    s78 = (s66 * k53 + alpha_A_4 * (k51 - s55 * k52)) / pivot_A_2
+    s79 = s59 * k53 + k36 * (cos_phi * s78)
+    s80 = s58 * k32
+    s81 = (k4 * (s80 + s80) + s56 * k32 - alpha_A_4 * (k54 + s55 * k55)) / pivot_A_2
+    s82 = s30 * k32 + (k32 * s68 + coupling_B_A * s81)
+    s83 = s82 * k57
+    s84 = s58 * k31
+    s85 = (k4 * (s84 + s84) - s66 * k61 + s56 * k31 - alpha_A_4 * (k59 + s55 * k60)) / pivot_A_2
+    s86 = k4 * (s30 * k31 + (k31 * s68 + coupling_B_A * s85)) - s59 * k61
     return (
         0.0,
         0.0,
@@ -784,33 +801,33 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        s68 * s16 - s62 * k40 - (s63 * k41 + s70 * s71),
-        sin_theta_phi * s75 - s16 * s73,
-        s62 * k48 + s16 * s77 + (s63 * k49 - s71 * s78),
-        s71 * s80 - s16 * s79,
-        s62 * k55 + s16 * s82 - sin_theta_phi * s84,
-        s16 * s86 + (s63 * k55 - s71 * s87),
+        s67 * s15 - s61 * k41 - (s62 * k42 + s69 * s70),
+        sin_angle_B * s74 - s15 * s72,
+        s61 * k49 + s15 * s76 + (s62 * k50 - s70 * s77),
+        s70 * s79 - s15 * s78,
+        s61 * k56 + s15 * s81 - sin_angle_B * s83,
+        s15 * s85 + (s62 * k56 - s70 * s86),
         0.0,
-        s70 * s72 - s65 * k41 - (s64 * k40 + s68 * s17),
-        s17 * s73 - cos_theta_phi * s75,
-        s64 * k48 - s17 * s77 + (s65 * k49 + s72 * s78),
-        s17 * s79 - s72 * s80,
-        s64 * k55 - s17 * s82 + cos_theta_phi * s84,
-        s65 * k55 + s72 * s87 - s17 * s86,
+        s69 * s71 - s64 * k42 - (s63 * k41 + s67 * s16),
+        s16 * s72 - cos_angle_B * s74,
+        s63 * k49 - s16 * s76 + (s64 * k50 + s71 * s77),
+        s16 * s78 - s71 * s79,
+        s63 * k56 - s16 * s81 + cos_angle_B * s83,
+        s64 * k56 + s71 * s86 - s16 * s85,
         -1.0,
-        s68,
-        -s73,
-        s77,
-        -s79,
-        s82,
-        s86,
+        s67,
+        -s72,
+        s76,
+        -s78,
+        s81,
+        s85,
         0.0,
-        -(s68 + s70),
-        s73 + k35 * s74,
-        -(s77 + s78),
-        s79 + s80,
-        k57 * s83 - s82,
-        -(s86 + s87),
+        -(s67 + s69),
+        s72 + k36 * s73,
+        -(s76 + s77),
+        s78 + s79,
+        k58 * s82 - s81,
+        -(s85 + s86),
         0.0,
     )
 
@@ -1129,6 +1146,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (1, 4), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

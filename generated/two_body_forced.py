@@ -125,6 +125,7 @@ COST = {
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "effect_powers": {"add": 8, "sub": 5, "mul": 18, "sin": 2, "cos": 2, "total": 35, "parameters": 4},
+    "effect_forces": {"add": 2, "sub": 4, "mul": 14, "neg": 1, "sin": 2, "cos": 2, "total": 25, "parameters": 7},
     "momentum": {"add": 13, "sub": 4, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
     "joint_forces": {"add": 14, "sub": 11, "mul": 41, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 50},
@@ -147,134 +148,137 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, d_A, d_B, g):
         return "inertia_com of B is negative"
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k74 = m_A * m_B
-    k75 = l_B_squared * k74
-    k76 = k75 / mass_A
-    pivot_B = I_B + k76
-    k77 = I_B * mass_A
-    k78 = k75 + k77
-    k79 = m_A * I_A
-    k80 = I_A * m_B
-    k81 = m_B * k79
+    k75 = m_A * m_B
+    k76 = l_B_squared * k75
+    k77 = k76 / mass_A
+    pivot_B = I_B + k77
+    k78 = I_B * mass_A
+    k79 = k76 + k78
+    k80 = m_A * I_A
+    k81 = I_A * m_B
+    k82 = m_B * k80
     l_A_squared = l_A * l_A
-    k82 = I_B * k74
-    k83 = l_A_squared * k82
-    k84 = k79 + k80
-    k85 = k83 + (l_B_squared * k81 + I_B * k84)
-    k1 = k85 / k78
+    k83 = I_B * k75
+    k84 = l_A_squared * k83
+    k85 = k80 + k81
+    k86 = k84 + (l_B_squared * k82 + I_B * k85)
+    k1 = k86 / k79
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k86 = l_B_squared * l_A_squared
-    k87 = m_A_squared * k86
-    k88 = m_B_squared * k87
-    k2 = k88 / (mass_A * k78)
+    k87 = l_B_squared * l_A_squared
+    k88 = m_A_squared * k87
+    k89 = m_B_squared * k88
+    k2 = k89 / (mass_A * k79)
     k3 = 1.0 / mass_A
-    k89 = l_A * k74
-    k4 = l_B * k89 / mass_A
+    k90 = l_A * k75
+    k4 = l_B * k90 / mass_A
     k5 = (m_A * l_B + d_B * mass_A) / mass_A
-    k14 = m_B * l_B
-    k6 = k14 / mass_A
+    moment_B_x = m_B * l_B
+    k6 = moment_B_x / mass_A
     k7 = 1.0 / pivot_B
-    k15 = m_B * l_A
-    k90 = d_A * mass_A
-    k8 = (k90 - k15) / mass_A
-    k9 = (k15 - k90) / mass_A
-    k91 = m_A * l_A
-    k10 = k91 / mass_A
-    k11 = k15 / mass_A
-    k12 = (k83 + (I_A * k75 + I_A * k77)) / k78
+    k14 = m_B * l_A
+    k91 = d_A * mass_A
+    k8 = (k91 - k14) / mass_A
+    k9 = (k14 - k91) / mass_A
+    k92 = m_A * l_A
+    k10 = k92 / mass_A
+    k11 = k14 / mass_A
+    k12 = (k84 + (I_A * k76 + I_A * k78)) / k79
     k13 = k2 * 2.0
-    k16 = g * mass_A
-    k92 = m_B * l_B_squared
-    k17 = l_B * k15
-    k18 = I_B + k92
-    k19 = 2.0 * (m_B * (l_A * l_B))
-    k20 = I_B + (I_A + (k92 + m_B * l_A_squared))
-    k21 = g * k15
-    k22 = g * k14
-    k23 = l_B + d_B
-    k24 = -k15
-    k33 = m_A * g
-    k34 = m_B * g
-    k25 = k33 + k34
-    k26 = l_A * k34
-    k27 = l_B * k34
-    k28 = l_A * k14
-    k29 = I_A / 2.0
-    k30 = I_B / 2.0
-    k31 = m_A / 2.0
-    k32 = m_B / 2.0
+    k15 = g * mass_A
+    k93 = m_B * l_B_squared
+    k16 = l_B * k14
+    k17 = I_B + k93
+    k18 = 2.0 * (m_B * (l_A * l_B))
+    k19 = I_B + (I_A + (k93 + m_B * l_A_squared))
+    k20 = g * k14
+    k21 = g * moment_B_x
+    k22 = l_B + d_B
+    k23 = -k14
+    k32 = m_A * g
+    k33 = m_B * g
+    k24 = k32 + k33
+    k25 = l_A * k33
+    k26 = l_B * k33
+    k27 = l_A * moment_B_x
+    k28 = I_A / 2.0
+    k29 = I_B / 2.0
+    k30 = m_A / 2.0
+    k31 = m_B / 2.0
+    k34 = -k32
     k35 = -k33
-    k36 = m_A / mass_A
-    k37 = m_B / mass_A
-    k38 = k89 / mass_A
-    k39 = l_B * k74 / mass_A
-    k93 = m_A * I_B
-    k94 = m_B * I_B
-    k95 = k75 + (k93 + k94)
-    k40 = k85 / k95
-    k96 = mass_A * k95
-    k41 = k88 / k96
-    k97 = I_A * I_B
-    k42 = (k94 * l_A_squared + (k97 + l_B_squared * k80) - k40 * k18) / k95
-    k43 = (m_B_squared * (k86 * (m_A * 2.0)) - k41 * (k95 + mass_A * k18)) / k96
-    k44 = k3 / mass_A
-    k45 = (k17 - k4) / mass_A
-    k46 = (k23 - k5) / mass_A
-    k47 = k6 / mass_A
-    k48 = k7 * ((k92 - k76) / mass_A) / pivot_B
-    k49 = (d_A - k8) / mass_A
-    k50 = (d_A + k9) / mass_A
-    k51 = (l_A - k10) / mass_A
-    k52 = k11 / mass_A
-    k53 = -k47
-    k54 = k95 / k95
-    k98 = m_A * l_B_squared
-    k99 = I_B + k98
-    k55 = (k93 * l_A_squared + (k97 + l_B_squared * k79) - k40 * k99) / k95
-    k56 = (k87 * (m_B * 2.0) - k41 * (k95 + mass_A * k99)) / k96
-    k57 = (l_B * k91 - k4) / mass_A
-    k58 = (d_B - k5) / mass_A
-    k59 = (l_B - k6) / mass_A
-    k60 = k7 * ((k98 - k76) / mass_A) / pivot_B
-    k61 = (d_A - l_A - k8) / mass_A
-    k62 = (l_A - d_A - k9) / mass_A
-    k63 = k10 / mass_A
-    k64 = (l_A - k11) / mass_A
-    k65 = (k84 + k74 * l_A_squared - mass_A * k40) / k95
-    k66 = k41 * (mass_A * mass_A) / k96
-    k67 = k7 / pivot_B
-    k100 = l_A * 2.0
-    k68 = k82 * k100 / k95
-    k101 = m_A_squared * m_B_squared
-    k69 = k100 * (l_B_squared * k101) / k96
-    k102 = l_B * 2.0
-    k103 = k74 * k102
-    k70 = (k81 * k102 - k40 * k103) / k95
-    k71 = (k102 * (l_A_squared * k101) - k41 * (mass_A * k103)) / k96
-    k72 = k7 * (k103 / mass_A) / pivot_B
-    k73 = mass_A / mass_A
+    k36 = -k24
+    k37 = m_A / mass_A
+    k38 = m_B / mass_A
+    k39 = k90 / mass_A
+    k40 = l_B * k75 / mass_A
+    k94 = m_A * I_B
+    k95 = m_B * I_B
+    k96 = k76 + (k94 + k95)
+    k41 = k86 / k96
+    k97 = mass_A * k96
+    k42 = k89 / k97
+    k98 = I_A * I_B
+    k43 = (k95 * l_A_squared + (k98 + l_B_squared * k81) - k41 * k17) / k96
+    k44 = (m_B_squared * (k87 * (m_A * 2.0)) - k42 * (k96 + mass_A * k17)) / k97
+    k45 = k3 / mass_A
+    k46 = (k16 - k4) / mass_A
+    k47 = (k22 - k5) / mass_A
+    k48 = k6 / mass_A
+    k49 = k7 * ((k93 - k77) / mass_A) / pivot_B
+    k50 = (d_A - k8) / mass_A
+    k51 = (d_A + k9) / mass_A
+    k52 = (l_A - k10) / mass_A
+    k53 = k11 / mass_A
+    k54 = -k48
+    k55 = k96 / k96
+    k99 = m_A * l_B_squared
+    k100 = I_B + k99
+    k56 = (k94 * l_A_squared + (k98 + l_B_squared * k80) - k41 * k100) / k96
+    k57 = (k88 * (m_B * 2.0) - k42 * (k96 + mass_A * k100)) / k97
+    k58 = (l_B * k92 - k4) / mass_A
+    k59 = (d_B - k5) / mass_A
+    k60 = (l_B - k6) / mass_A
+    k61 = k7 * ((k99 - k77) / mass_A) / pivot_B
+    k62 = (d_A - l_A - k8) / mass_A
+    k63 = (l_A - d_A - k9) / mass_A
+    k64 = k10 / mass_A
+    k65 = (l_A - k11) / mass_A
+    k66 = (k85 + k75 * l_A_squared - mass_A * k41) / k96
+    k67 = k42 * (mass_A * mass_A) / k97
+    k68 = k7 / pivot_B
+    k101 = l_A * 2.0
+    k69 = k83 * k101 / k96
+    k102 = m_A_squared * m_B_squared
+    k70 = k101 * (l_B_squared * k102) / k97
+    k103 = l_B * 2.0
+    k104 = k75 * k103
+    k71 = (k82 * k103 - k41 * k104) / k96
+    k72 = (k103 * (l_A_squared * k102) - k42 * (mass_A * k104)) / k97
+    k73 = k7 * (k104 / mass_A) / pivot_B
+    k74 = mass_A / mass_A
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
         "jacobian": (k2, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13),
         "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "inverse_dynamics": (l_A, d_A, mass_A, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23),
-        "mass_matrix": (mass_A, k14, k15, k17, k18, k19, k20, k24),
-        "velocity_force": (k14, k15, k17),
-        "gravity_force": (k25, k26, k27),
-        "bias_force": (k14, k15, k16, k26, k27, k28),
-        "applied_force": (l_A, d_A, k23),
-        "kinetic_energy": (l_A, l_B, k29, k30, k31, k32),
-        "potential_energy": (l_A, l_B, k33, k34),
-        "effect_powers": (l_A, l_B, d_A, d_B, k23, k34, k35),
+        "inverse_dynamics": (l_A, d_A, mass_A, moment_B_x, k14, k15, k16, k17, k18, k19, k20, k21, k22),
+        "mass_matrix": (mass_A, moment_B_x, k14, k16, k17, k18, k19, k23),
+        "velocity_force": (moment_B_x, k14, k16),
+        "gravity_force": (k24, k25, k26),
+        "bias_force": (moment_B_x, k14, k15, k25, k26, k27),
+        "applied_force": (l_A, d_A, k22),
+        "kinetic_energy": (l_A, l_B, k28, k29, k30, k31),
+        "potential_energy": (l_A, l_B, k32, k33),
+        "effect_powers": (l_A, l_B, d_A, d_B, k22, k33, k34),
+        "effect_forces": (l_A, d_A, k22, k26, k35, k36),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k3),
-        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k36, k37, k38, k39),
+        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k37, k38, k39, k40),
         "body_poses": (l_A, l_B),
         "body_velocities": (l_A, l_B),
         "input_jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "parameter_jacobian": (k4, k5, k6, k7, k8, k9, k10, k11, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73),
+        "parameter_jacobian": (k4, k5, k6, k7, k8, k9, k10, k11, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74),
     }
 
 
@@ -328,29 +332,29 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k4
-    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s3 - theta_dot_squared * s2
+    s1 = sin_phi * k4
+    s2 = k6 * (f_A_x * sin_angle_B - f_A_y * cos_angle_B) + (tau + k5 * (f_B_y * cos_angle_B - f_B_x * sin_angle_B))
+    load_B = s2 - theta_dot_squared * s1
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s4 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
-    alpha_A = (s2 * omega_B_squared + s4 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
+    s3 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
+    alpha_A = (s1 * omega_B_squared + s3 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s5 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
-    s6 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
+    s4 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
+    s5 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        k6 * (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) + s5,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s6 - g,
+        k6 * (sin_angle_B * alpha_B + cos_angle_B * omega_B_squared) + s4,
+        k6 * (sin_angle_B * omega_B_squared - cos_angle_B * alpha_B) + s5 - g,
         alpha_A,
         alpha_B - alpha_A,
     )
@@ -364,48 +368,48 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k4
-    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s3 - theta_dot_squared * s2
+    s1 = sin_phi * k4
+    s2 = k6 * (f_A_x * sin_angle_B - f_A_y * cos_angle_B) + (tau + k5 * (f_B_y * cos_angle_B - f_B_x * sin_angle_B))
+    load_B = s2 - theta_dot_squared * s1
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s7 = cos_theta_phi * omega_B_squared
+    s6 = cos_angle_B * omega_B_squared
     pivot_A = k12 + sin_phi * sin_phi * k2
-    s8 = coupling_B_A * k7
-    s9 = f_A_y * k8
-    s10 = f_A_x * k9
-    s11 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (cos_theta * s9 + sin_theta * s10)
-    alpha_A_2 = (s2 * omega_B_squared + s11 - tau - load_B * s8) / pivot_A
+    s7 = coupling_B_A * k7
+    s8 = f_A_y * k8
+    s9 = f_A_x * k9
+    s10 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (cos_theta * s8 + sin_theta * s9)
+    alpha_A_2 = (s1 * omega_B_squared + s10 - tau - load_B * s7) / pivot_A
     alpha_B_2 = k7 * (load_B - coupling_B_A * alpha_A_2)
-    s12 = sin_theta_phi * alpha_B_2
-    s13 = cos_theta_phi * alpha_B_2
-    s14 = k6 * (f_A_x * cos_theta_phi + f_A_y * sin_theta_phi) - k5 * (f_B_y * sin_theta_phi + f_B_x * cos_theta_phi)
-    s15 = cos_theta * s10 - sin_theta * s9 - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
-    s16 = (s15 - s8 * s14) / pivot_A
-    s17 = k7 * (s14 - coupling_B_A * s16)
-    s18 = theta_dot_squared * cos_theta - (cos_theta * s16 - sin_theta * alpha_A_2)
-    s19 = s14 - coupling_B_A * theta_dot_squared
-    s20 = coupling_B_A * omega_B_squared - k7 * (coupling_B_A * s19 - s2 * load_B) - k13 * (cos_phi * (sin_phi * alpha_A_2))
-    s21 = s20 / pivot_A
-    s22 = k7 * (s19 - (coupling_B_A * s21 - s2 * alpha_A_2))
-    s23 = sin_theta * k11
-    s24 = cos_theta * k11
-    s25 = theta_dot * 2.0
-    s26 = s2 * s25
-    s27 = omega_B * 2.0
-    s28 = s2 * s27
-    s29 = (s8 * s26 + s28) / pivot_A
-    s30 = k7 * (s26 + coupling_B_A * s29)
-    s31 = cos_theta_phi * s27
-    s32 = sin_theta_phi * s27
-    s33 = s28 / pivot_A
-    s34 = s8 * s33
+    s11 = sin_angle_B * alpha_B_2
+    s12 = cos_angle_B * alpha_B_2
+    s13 = k6 * (f_A_x * cos_angle_B + f_A_y * sin_angle_B) - k5 * (f_B_y * sin_angle_B + f_B_x * cos_angle_B)
+    s14 = cos_theta * s9 - sin_theta * s8 - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
+    s15 = (s14 - s7 * s13) / pivot_A
+    s16 = k7 * (s13 - coupling_B_A * s15)
+    s17 = theta_dot_squared * cos_theta - (cos_theta * s15 - sin_theta * alpha_A_2)
+    s18 = s13 - coupling_B_A * theta_dot_squared
+    s19 = coupling_B_A * omega_B_squared - k7 * (coupling_B_A * s18 - s1 * load_B) - k13 * (cos_phi * (sin_phi * alpha_A_2))
+    s20 = s19 / pivot_A
+    s21 = k7 * (s18 - (coupling_B_A * s20 - s1 * alpha_A_2))
+    s22 = sin_theta * k11
+    s23 = cos_theta * k11
+    s24 = theta_dot * 2.0
+    s25 = s1 * s24
+    s26 = omega_B * 2.0
+    s27 = s1 * s26
+    s28 = (s7 * s25 + s27) / pivot_A
+    s29 = k7 * (s25 + coupling_B_A * s28)
+    s30 = cos_angle_B * s26
+    s31 = sin_angle_B * s26
+    s32 = s27 / pivot_A
+    s33 = s7 * s32
     return (
         0.0,
         0.0,
@@ -441,36 +445,36 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         1.0,
         0.0,
         0.0,
-        k11 * (cos_theta * alpha_A_2 + sin_theta * (s16 - theta_dot_squared)) + k6 * (s13 + sin_theta_phi * (s17 - omega_B_squared)),
-        s21 * s23 + k6 * (s13 + sin_theta_phi * (s22 - omega_B_squared)),
+        k11 * (cos_theta * alpha_A_2 + sin_theta * (s15 - theta_dot_squared)) + k6 * (s12 + sin_angle_B * (s16 - omega_B_squared)),
+        s20 * s22 + k6 * (s12 + sin_angle_B * (s21 - omega_B_squared)),
         0.0,
         0.0,
-        k11 * (sin_theta * s29 + cos_theta * s25) + k6 * (s31 - sin_theta_phi * s30),
-        s23 * s33 + k6 * (s31 - sin_theta_phi * s34),
+        k11 * (sin_theta * s28 + cos_theta * s24) + k6 * (s30 - sin_angle_B * s29),
+        s22 * s32 + k6 * (s30 - sin_angle_B * s33),
         0.0,
         0.0,
-        k11 * s18 + k6 * (s7 - (cos_theta_phi * s17 - s12)),
-        k6 * (s7 - (cos_theta_phi * s22 - s12)) - s21 * s24,
+        k11 * s17 + k6 * (s6 - (cos_angle_B * s16 - s11)),
+        k6 * (s6 - (cos_angle_B * s21 - s11)) - s20 * s23,
         0.0,
         0.0,
-        k11 * (sin_theta * s25 - cos_theta * s29) + k6 * (s32 + cos_theta_phi * s30),
-        k6 * (s32 + cos_theta_phi * s34) - s24 * s33,
+        k11 * (sin_theta * s24 - cos_theta * s28) + k6 * (s31 + cos_angle_B * s29),
+        k6 * (s31 + cos_angle_B * s33) - s23 * s32,
         0.0,
         0.0,
-        s16,
-        s21,
+        s15,
+        s20,
         0.0,
         0.0,
-        s29,
-        s33,
+        s28,
+        s32,
         0.0,
         0.0,
-        s17 - s16,
-        s22 - s21,
+        s16 - s15,
+        s21 - s20,
         0.0,
         0.0,
-        -(s29 + s30),
-        -(s33 + s34),
+        -(s28 + s29),
+        -(s32 + s33),
     )
 
 
@@ -482,27 +486,27 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     tau__x_A, tau__y_A, tau__theta, tau__phi = extra
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k4
+    s1 = sin_phi * k4
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s35 = tau + tau__phi
-    s36 = k6 * (sin_theta_phi * (f_A_x + tau__x_A) - cos_theta_phi * (f_A_y + tau__y_A))
-    load_B_2 = s36 + (k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi) + s35) - theta_dot_squared * s2
-    s37 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
-    s38 = s2 * omega_B_squared + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s37)
-    alpha_A_3 = (s38 - s35 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
+    s34 = tau + tau__phi
+    s35 = k6 * (sin_angle_B * (f_A_x + tau__x_A) - cos_angle_B * (f_A_y + tau__y_A))
+    load_B_2 = s35 + (k5 * (f_B_y * cos_angle_B - f_B_x * sin_angle_B) + s34) - theta_dot_squared * s1
+    s36 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
+    s37 = s1 * omega_B_squared + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s36)
+    alpha_A_3 = (s37 - s34 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B_3 = k7 * (load_B_2 - coupling_B_A * alpha_A_3)
-    s39 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
-    s40 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
+    s38 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
+    s39 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
     return (
-        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B_3) + s39,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_3) + s40 - g,
+        k6 * (cos_angle_B * omega_B_squared + sin_angle_B * alpha_B_3) + s38,
+        k6 * (sin_angle_B * omega_B_squared - cos_angle_B * alpha_B_3) + s39 - g,
         alpha_A_3,
         alpha_B_3 - alpha_A_3,
     )
@@ -510,183 +514,215 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """91 operations: 26 add, 13 sub, 46 mul, 3 sin, 3 cos."""
-    l_A, d_A, mass_A, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23 = k
+    l_A, d_A, mass_A, moment_B_x, k14, k15, k16, k17, k18, k19, k20, k21, k22 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     x_A_ddot, y_A_ddot, theta_ddot, phi_ddot = extra
     sin_phi = sin(phi)
     cos_phi = cos(phi)
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s41 = sin_phi * theta_dot_squared
-    s42 = k15 * sin_theta + sin_theta_phi * k14
-    s43 = x_A_ddot * mass_A - (f_A_x + f_B_x + theta_ddot * s42) - k15 * (theta_dot_squared * cos_theta)
-    s44 = k15 * cos_theta + cos_theta_phi * k14
-    s45 = k14 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (theta_ddot * s44 + y_A_ddot * mass_A)
-    s46 = cos_phi * k17 + k18
-    s47 = k23 * (f_B_x * sin_theta_phi - f_B_y * cos_theta_phi)
-    s48 = cos_theta_phi * k22
-    s49 = y_A_ddot * s44 + (phi_ddot * s46 + theta_ddot * (cos_phi * k19 + k20)) + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)
-    s50 = cos_theta * k21 + (l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s47 + s49))
-    s51 = k14 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s48 + (s47 + (theta_ddot * s46 + phi_ddot * k18)))
+    s40 = sin_phi * theta_dot_squared
+    s41 = k14 * sin_theta + sin_angle_B * moment_B_x
+    s42 = x_A_ddot * mass_A - (f_A_x + f_B_x + theta_ddot * s41) - k14 * (theta_dot_squared * cos_theta)
+    s43 = k14 * cos_theta + cos_angle_B * moment_B_x
+    s44 = moment_B_x * (phi_ddot * cos_angle_B - sin_angle_B * omega_B_squared) + (theta_ddot * s43 + y_A_ddot * mass_A)
+    s45 = cos_phi * k16 + k17
+    s46 = k22 * (f_B_x * sin_angle_B - f_B_y * cos_angle_B)
+    s47 = cos_angle_B * k21
+    s48 = y_A_ddot * s43 + (phi_ddot * s45 + theta_ddot * (cos_phi * k18 + k19)) + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)
+    s49 = cos_theta * k20 + (l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s46 + s48))
+    s50 = moment_B_x * (y_A_ddot * cos_angle_B - x_A_ddot * sin_angle_B) + (s47 + (s46 + (theta_ddot * s45 + phi_ddot * k17)))
     return (
-        s43 - k14 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        k16 + s45 - (f_A_y + f_B_y) - k15 * (theta_dot_squared * sin_theta),
-        k17 * (s41 - sin_phi * omega_B_squared) + (s48 + s50) - x_A_ddot * s42,
-        s41 * k17 + s51 - tau,
+        s42 - moment_B_x * (cos_angle_B * omega_B_squared + phi_ddot * sin_angle_B),
+        k15 + s44 - (f_A_y + f_B_y) - k14 * (theta_dot_squared * sin_theta),
+        k16 * (s40 - sin_phi * omega_B_squared) + (s47 + s49) - x_A_ddot * s41,
+        s40 * k16 + s50 - tau,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     """17 operations: 4 add, 1 sub, 6 mul, 1 neg, 2 sin, 3 cos."""
-    mass_A, k14, k15, k17, k18, k19, k20, k24 = k
+    mass_A, moment_B_x, k14, k16, k17, k18, k19, k23 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
-    s1 = theta + phi
-    s52 = sin(s1) * k14
-    s53 = cos(s1) * k14
-    s44 = k15 * cos(theta) + s53
-    s46 = cos_phi * k17 + k18
-    s54 = -s52
-    s55 = k24 * sin(theta) - s52
+    angle_B = theta + phi
+    s51 = sin(angle_B) * moment_B_x
+    s52 = cos(angle_B) * moment_B_x
+    s43 = k14 * cos(theta) + s52
+    s45 = cos_phi * k16 + k17
+    s53 = -s51
+    s54 = k23 * sin(theta) - s51
     return (
         mass_A,
         0.0,
-        s55,
         s54,
+        s53,
         0.0,
         mass_A,
-        s44,
-        s53,
-        s55,
-        s44,
-        cos_phi * k19 + k20,
-        s46,
+        s43,
+        s52,
         s54,
+        s43,
+        cos_phi * k18 + k19,
+        s45,
         s53,
-        s46,
-        k18,
+        s52,
+        s45,
+        k17,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """23 operations: 4 add, 1 sub, 11 mul, 2 neg, 3 sin, 2 cos."""
-    k14, k15, k17 = k
+    moment_B_x, k14, k16 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     theta_dot_squared = theta_dot * theta_dot
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s56 = theta_dot_squared * k15
-    s57 = sin(phi) * k17
-    s58 = k14 * omega_B_squared
+    s55 = theta_dot_squared * k14
+    s56 = sin(phi) * k16
+    s57 = moment_B_x * omega_B_squared
     return (
-        -(cos(theta) * s56 + cos(s1) * s58),
-        -(sin(theta) * s56 + sin(s1) * s58),
-        (theta_dot_squared - omega_B_squared) * s57,
-        theta_dot_squared * s57,
+        -(cos(theta) * s55 + cos(angle_B) * s57),
+        -(sin(theta) * s55 + sin(angle_B) * s57),
+        (theta_dot_squared - omega_B_squared) * s56,
+        theta_dot_squared * s56,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k25, k26, k27 = k
+    k24, k25, k26 = k
     _, _, theta, phi, _, _, _, _ = y
-    s59 = cos(theta + phi) * k27
+    s58 = cos(theta + phi) * k26
     return (
         0.0,
-        k25,
-        cos(theta) * k26 + s59,
-        s59,
+        k24,
+        cos(theta) * k25 + s58,
+        s58,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """28 operations: 6 add, 3 sub, 13 mul, 1 neg, 3 sin, 2 cos."""
-    k14, k15, k16, k26, k27, k28 = k
+    moment_B_x, k14, k15, k25, k26, k27 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s56 = theta_dot_squared * k15
-    s58 = k14 * omega_B_squared
-    s59 = cos_theta_phi * k27
-    s60 = sin(phi) * k28
+    s55 = theta_dot_squared * k14
+    s57 = moment_B_x * omega_B_squared
+    s58 = cos_angle_B * k26
+    s59 = sin(phi) * k27
     return (
-        -(cos_theta * s56 + cos_theta_phi * s58),
-        k16 - sin(theta) * s56 - sin(s1) * s58,
-        (theta_dot_squared - omega_B_squared) * s60 + (cos_theta * k26 + s59),
-        s59 + theta_dot_squared * s60,
+        -(cos_theta * s55 + cos_angle_B * s57),
+        k15 - sin(theta) * s55 - sin(angle_B) * s57,
+        (theta_dot_squared - omega_B_squared) * s59 + (cos_theta * k25 + s58),
+        s58 + theta_dot_squared * s59,
     )
 
 
 def _applied_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     """22 operations: 6 add, 3 sub, 9 mul, 2 sin, 2 cos."""
-    l_A, d_A, k23 = k
+    l_A, d_A, k22 = k
     _, _, theta, phi, _, _, _, _ = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
-    s1 = theta + phi
+    angle_B = theta + phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s61 = (f_B_y * cos(s1) - f_B_x * sin(s1)) * k23
+    s60 = (f_B_y * cos(angle_B) - f_B_x * sin(angle_B)) * k22
     return (
         f_A_x + f_B_x,
         f_A_y + f_B_y,
-        l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s61),
-        tau + s61,
+        l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s60),
+        tau + s60,
     )
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """31 operations: 9 add, 2 sub, 16 mul, 2 sin, 2 cos."""
-    l_A, l_B, k29, k30, k31, k32 = k
+    l_A, l_B, k28, k29, k30, k31 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     omega_B = theta_dot + phi_dot
-    s62 = l_A * theta_dot
-    s63 = l_B * omega_B
-    xd_B = x_A_dot - sin(theta) * s62 - sin(s1) * s63
-    yd_B = cos(s1) * s63 + (y_A_dot + cos(theta) * s62)
-    s64 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k31 + (theta_dot * theta_dot * k29 + omega_B * omega_B * k30)
+    s61 = l_A * theta_dot
+    s62 = l_B * omega_B
+    xd_B = x_A_dot - sin(theta) * s61 - sin(angle_B) * s62
+    yd_B = cos(angle_B) * s62 + (y_A_dot + cos(theta) * s61)
+    s63 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k30 + (theta_dot * theta_dot * k28 + omega_B * omega_B * k29)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k32 + s64,
+        (xd_B * xd_B + yd_B * yd_B) * k31 + s63,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k33, k34 = k
+    l_A, l_B, k32, k33 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k33 + k34 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k32 + k33 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
     """35 operations: 8 add, 5 sub, 18 mul, 2 sin, 2 cos."""
-    l_A, l_B, d_A, d_B, k23, k34, k35 = k
+    l_A, l_B, d_A, d_B, k22, k33, k34 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
-    s1 = theta + phi
+    angle_B = theta + phi
     omega_B = theta_dot + phi_dot
-    s65 = theta_dot * sin(theta)
-    s66 = theta_dot * cos(theta)
-    s67 = cos(s1) * omega_B
-    yd_B_2 = l_B * s67 + (y_A_dot + l_A * s66)
+    s64 = theta_dot * sin(theta)
+    s65 = theta_dot * cos(theta)
+    s66 = cos(angle_B) * omega_B
+    yd_B_2 = l_B * s66 + (y_A_dot + l_A * s65)
     return (
-        y_A_dot * k35 - k34 * yd_B_2,
-        f_A_x * (x_A_dot - d_A * s65) + f_A_y * (y_A_dot + d_A * s66),
-        f_B_x * (x_A_dot - l_A * s65 - sin(s1) * omega_B * k23) + f_B_y * (yd_B_2 + d_B * s67),
+        y_A_dot * k34 - k33 * yd_B_2,
+        f_A_x * (x_A_dot - d_A * s64) + f_A_y * (y_A_dot + d_A * s65),
+        f_B_x * (x_A_dot - l_A * s64 - sin(angle_B) * omega_B * k22) + f_B_y * (yd_B_2 + d_B * s66),
         tau * (omega_B - theta_dot),
+    )
+
+
+def _effect_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """25 operations: 2 add, 4 sub, 14 mul, 1 neg, 2 sin, 2 cos."""
+    l_A, d_A, k22, k26, k35, k36 = k
+    _, _, theta, phi, _, _, _, _ = y
+    f_A_x, f_A_y, f_B_x, f_B_y, tau = u
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    cos_theta = cos(theta)
+    sin_theta = sin(theta)
+    s58 = cos_angle_B * k26
+    s67 = l_A * cos_theta
+    s68 = f_B_y * (cos_angle_B * k22) - f_B_x * (sin(angle_B) * k22)
+    return (
+        0.0,
+        k36,
+        k35 * s67 - s58,
+        -s58,
+        f_A_x,
+        f_A_y,
+        f_A_y * (d_A * cos_theta) - f_A_x * (d_A * sin_theta),
+        0.0,
+        f_B_x,
+        f_B_y,
+        s68 + (f_B_y * s67 - f_B_x * (l_A * sin_theta)),
+        s68,
+        0.0,
+        0.0,
+        0.0,
+        tau,
     )
 
 
@@ -694,21 +730,21 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """42 operations: 13 add, 4 sub, 21 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
-    s62 = l_A * theta_dot
-    s68 = l_B * sin(s1)
-    xd_B_2 = x_A_dot - sin_theta * s62 - omega_B * s68
-    s69 = l_B * cos(s1)
-    yd_B_3 = omega_B * s69 + (y_A_dot + cos_theta * s62)
-    s70 = yd_B_3 * (s69 + (x_A + l_A * cos_theta)) - xd_B_2 * (s68 + (y_A + l_A * sin_theta))
-    s71 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s61 = l_A * theta_dot
+    s69 = l_B * sin(angle_B)
+    xd_B_2 = x_A_dot - sin_theta * s61 - omega_B * s69
+    s70 = l_B * cos(angle_B)
+    yd_B_3 = omega_B * s70 + (y_A_dot + cos_theta * s61)
+    s71 = yd_B_3 * (s70 + (x_A + l_A * cos_theta)) - xd_B_2 * (s69 + (y_A + l_A * sin_theta))
+    s72 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B_2,
         m_A * y_A_dot + m_B * yd_B_3,
-        m_B * s70 + s71,
+        m_B * s71 + s72,
     )
 
 
@@ -716,39 +752,39 @@ def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
     m_A, m_B, l_A, l_B, k3 = k
     x_A, y_A, theta, phi, _, _, _, _ = y
-    s1 = theta + phi
+    angle_B = theta + phi
     return (
-        k3 * (m_A * x_A + m_B * (l_B * cos(s1) + (x_A + l_A * cos(theta)))),
-        k3 * (m_A * y_A + m_B * (l_B * sin(s1) + (y_A + l_A * sin(theta)))),
+        k3 * (m_A * x_A + m_B * (l_B * cos(angle_B) + (x_A + l_A * cos(theta)))),
+        k3 * (m_A * y_A + m_B * (l_B * sin(angle_B) + (y_A + l_A * sin(theta)))),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """74 operations: 14 add, 11 sub, 41 mul, 1 div, 1 neg, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k36, k37, k38, k39 = k
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k37, k38, k39, k40 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = sin_phi * k4
-    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s3 - theta_dot_squared * s2
+    s1 = sin_phi * k4
+    s2 = k6 * (f_A_x * sin_angle_B - f_A_y * cos_angle_B) + (tau + k5 * (f_B_y * cos_angle_B - f_B_x * sin_angle_B))
+    load_B = s2 - theta_dot_squared * s1
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s4 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
-    alpha_A = (s2 * omega_B_squared + s4 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
+    s3 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
+    alpha_A = (s1 * omega_B_squared + s3 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s72 = f_B_x * k36 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k38
-    s73 = f_B_y * k36 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k38
+    s73 = f_B_x * k37 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k39
+    s74 = f_B_y * k37 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k39
     return (
-        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k39 + s72 - f_A_x * k37,
-        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k39 + s73 - f_A_y * k37,
+        (sin_angle_B * alpha_B + cos_angle_B * omega_B_squared) * k40 + s73 - f_A_x * k38,
+        (sin_angle_B * omega_B_squared - cos_angle_B * alpha_B) * k40 + s74 - f_A_y * k38,
         -tau,
     )
 
@@ -757,14 +793,14 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     x_A, y_A, theta, phi, _, _, _, _ = y
-    s1 = theta + phi
+    angle_B = theta + phi
     return (
         x_A,
         y_A,
         theta,
-        l_B * cos(s1) + (x_A + l_A * cos(theta)),
-        l_B * sin(s1) + (y_A + l_A * sin(theta)),
-        s1,
+        l_B * cos(angle_B) + (x_A + l_A * cos(theta)),
+        l_B * sin(angle_B) + (y_A + l_A * sin(theta)),
+        angle_B,
     )
 
 
@@ -772,16 +808,16 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     """16 operations: 4 add, 2 sub, 6 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    s1 = theta + phi
+    angle_B = theta + phi
     omega_B = theta_dot + phi_dot
-    s62 = l_A * theta_dot
-    s63 = l_B * omega_B
+    s61 = l_A * theta_dot
+    s62 = l_B * omega_B
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
-        x_A_dot - sin(theta) * s62 - sin(s1) * s63,
-        cos(s1) * s63 + (y_A_dot + cos(theta) * s62),
+        x_A_dot - sin(theta) * s61 - sin(angle_B) * s62,
+        cos(angle_B) * s62 + (y_A_dot + cos(theta) * s61),
         omega_B,
     )
 
@@ -793,28 +829,28 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     pivot_A_2 = k1 + sin_phi * sin_phi * k2
     coupling_B_A = cos(phi) * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s8 = coupling_B_A * k7
-    s23 = sin_theta * k11
-    s24 = cos_theta * k11
-    s74 = sin_theta_phi * k6
-    s75 = (sin_theta * k9 - s74 * s8) / pivot_A_2
-    s76 = k7 * (s74 - coupling_B_A * s75)
-    s77 = cos_theta_phi * k6
-    s78 = (s8 * s77 + cos_theta * k8) / pivot_A_2
-    s79 = k7 * (s77 + coupling_B_A * s78)
-    s80 = k5 * sin_theta_phi
-    s81 = (s8 * s80 - sin_theta * k10) / pivot_A_2
-    s82 = k7 * (s80 + coupling_B_A * s81)
-    s83 = cos_theta_phi * k5
-    s84 = (cos_theta * k10 - s8 * s83) / pivot_A_2
-    s85 = k7 * (s83 - coupling_B_A * s84)
-    s86 = (-1.0 - s8) / pivot_A_2
-    s87 = k7 * (1.0 - coupling_B_A * s86)
+    s7 = coupling_B_A * k7
+    s22 = sin_theta * k11
+    s23 = cos_theta * k11
+    s75 = sin_angle_B * k6
+    s76 = (sin_theta * k9 - s75 * s7) / pivot_A_2
+    s77 = k7 * (s75 - coupling_B_A * s76)
+    s78 = cos_angle_B * k6
+    s79 = (s7 * s78 + cos_theta * k8) / pivot_A_2
+    s80 = k7 * (s78 + coupling_B_A * s79)
+    s81 = k5 * sin_angle_B
+    s82 = (s7 * s81 - sin_theta * k10) / pivot_A_2
+    s83 = k7 * (s81 + coupling_B_A * s82)
+    s84 = cos_angle_B * k5
+    s85 = (cos_theta * k10 - s7 * s84) / pivot_A_2
+    s86 = k7 * (s84 - coupling_B_A * s85)
+    s87 = (-1.0 - s7) / pivot_A_2
+    s88 = k7 * (1.0 - coupling_B_A * s87)
     return (
         0.0,
         0.0,
@@ -836,99 +872,99 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        s74 * s76 + (k3 + s75 * s23),
-        s23 * s78 - s74 * s79,
-        k3 + s23 * s81 - s74 * s82,
-        s23 * s84 + s74 * s85,
-        s23 * s86 + s74 * s87,
-        -(s75 * s24 + s76 * s77),
-        s77 * s79 + (k3 - s24 * s78),
-        s77 * s82 - s24 * s81,
-        k3 - s24 * s84 - s77 * s85,
-        -(s24 * s86 + s77 * s87),
-        s75,
-        s78,
-        s81,
-        s84,
-        s86,
-        s76 - s75,
-        -(s78 + s79),
-        -(s81 + s82),
-        s85 - s84,
-        s87 - s86,
+        s75 * s77 + (k3 + s76 * s22),
+        s22 * s79 - s75 * s80,
+        k3 + s22 * s82 - s75 * s83,
+        s22 * s85 + s75 * s86,
+        s22 * s87 + s75 * s88,
+        -(s76 * s23 + s77 * s78),
+        s78 * s80 + (k3 - s23 * s79),
+        s78 * s83 - s23 * s82,
+        k3 - s23 * s85 - s78 * s86,
+        -(s23 * s87 + s78 * s88),
+        s76,
+        s79,
+        s82,
+        s85,
+        s87,
+        s77 - s76,
+        -(s79 + s80),
+        -(s82 + s83),
+        s86 - s85,
+        s88 - s87,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     """293 operations: 50 add, 61 sub, 162 mul, 9 div, 5 neg, 3 sin, 3 cos."""
-    k4, k5, k6, k7, k8, k9, k10, k11, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73 = k
+    k4, k5, k6, k7, k8, k9, k10, k11, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
-    s88 = sin_phi * sin_phi
+    s89 = sin_phi * sin_phi
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
-    s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
+    angle_B = theta + phi
+    cos_angle_B = cos(angle_B)
+    sin_angle_B = sin(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s89 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
-    s90 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
+    s90 = f_B_y * cos_angle_B - f_B_x * sin_angle_B
+    s91 = f_A_x * sin_angle_B - f_A_y * cos_angle_B
     cos_theta = cos(theta)
-    s91 = f_A_y * cos_theta
+    s92 = f_A_y * cos_theta
     sin_theta = sin(theta)
-    s92 = f_A_x * sin_theta
+    s93 = f_A_x * sin_theta
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s93 = f_B_y * cos_theta - f_B_x * sin_theta
-    s8 = coupling_B_A * k7
-    s23 = sin_theta * k11
-    s24 = cos_theta * k11
-    s41 = sin_phi * theta_dot_squared
-    s94 = sin_phi * omega_B_squared
-    s74 = sin_theta_phi * k6
-    s77 = cos_theta_phi * k6
-    pivot_A_3 = k40 + s88 * k41
-    load_B_3 = k6 * s90 + (tau + k5 * s89) - k4 * s41
-    s95 = coupling_B_A * load_B_3
-    alpha_A_4 = (k4 * s94 + (k10 * s93 + (k8 * s91 + k9 * s92)) - tau - k7 * s95) / pivot_A_3
-    s96 = load_B_3 - coupling_B_A * alpha_A_4
-    alpha_B_4 = k7 * s96
-    s97 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
-    s98 = sin_theta_phi * alpha_B_4 + cos_theta_phi * omega_B_squared
-    s99 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
-    s100 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_4
-    s101 = cos_phi * k45
-    s102 = s89 * k46 - s90 * k47 - s41 * k45
-    s103 = s94 * k45 + (s93 * k51 + (s91 * k49 - s92 * k50)) - (k7 * (load_B_3 * s101 + coupling_B_A * s102) - s95 * k48)
-    s104 = (s103 - alpha_A_4 * (k42 + s88 * k43)) / pivot_A_3
-    s105 = k7 * (s102 - (alpha_A_4 * s101 + coupling_B_A * s104)) - s96 * k48
-    s106 = (f_A_x + f_B_x) * k44
-    s107 = (f_A_y + f_B_y) * k44
-    s108 = alpha_A_4 * k54 / pivot_A_3
-    s109 = s108 * s8
-    s110 = cos_phi * k57
-    s111 = s89 * k58 + s90 * k59 - s41 * k57
-    s112 = s94 * k57 + (s91 * k61 + s92 * k62 - s93 * k63) - (k7 * (load_B_3 * s110 + coupling_B_A * s111) - s95 * k60)
-    s113 = (s112 - alpha_A_4 * (k55 + s88 * k56)) / pivot_A_3
-    s114 = k7 * (s111 - (alpha_A_4 * s110 + coupling_B_A * s113)) - s96 * k60
-    s115 = (s95 * k67 - alpha_A_4 * (k65 - s88 * k66)) / pivot_A_3
-    s116 = s96 * k67 + s8 * s115
-    s117 = cos_phi * k39
-    s118 = s41 * k39
-    s119 = s94 * k39 + (s93 * k36 + k37 * (s92 - s91)) - k7 * (load_B_3 * s117 - coupling_B_A * s118)
-    s120 = (s119 - alpha_A_4 * (k68 + s88 * k69)) / pivot_A_3
-    s121 = k7 * (s118 + (alpha_A_4 * s117 + coupling_B_A * s120))
-    s122 = cos_phi * k38
-    s123 = s89 * k36 + s90 * k37 - s41 * k38
-    s124 = s94 * k38 - (k7 * (load_B_3 * s122 + coupling_B_A * s123) - s95 * k72) - alpha_A_4 * (k70 + s88 * k71)
-    s125 = s124 / pivot_A_3
-    s126 = k7 * (s123 - (alpha_A_4 * s122 + coupling_B_A * s125)) - s96 * k72
-    s127 = k73 * (s91 - s92) / pivot_A_3
-    s128 = s8 * s127
-    s129 = s89 * k73
-    s130 = s8 * s129 / pivot_A_3
-    s131 = k7 * (s129 + coupling_B_A * s130)
+    s94 = f_B_y * cos_theta - f_B_x * sin_theta
+    s7 = coupling_B_A * k7
+    s22 = sin_theta * k11
+    s23 = cos_theta * k11
+    s40 = sin_phi * theta_dot_squared
+    s95 = sin_phi * omega_B_squared
+    s75 = sin_angle_B * k6
+    s78 = cos_angle_B * k6
+    pivot_A_3 = k41 + s89 * k42
+    load_B_3 = k6 * s91 + (tau + k5 * s90) - k4 * s40
+    s96 = coupling_B_A * load_B_3
+    alpha_A_4 = (k4 * s95 + (k10 * s94 + (k8 * s92 + k9 * s93)) - tau - k7 * s96) / pivot_A_3
+    s97 = load_B_3 - coupling_B_A * alpha_A_4
+    alpha_B_4 = k7 * s97
+    s98 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
+    s99 = sin_angle_B * alpha_B_4 + cos_angle_B * omega_B_squared
+    s100 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
+    s101 = sin_angle_B * omega_B_squared - cos_angle_B * alpha_B_4
+    s102 = cos_phi * k46
+    s103 = s90 * k47 - s91 * k48 - s40 * k46
+    s104 = s95 * k46 + (s94 * k52 + (s92 * k50 - s93 * k51)) - (k7 * (load_B_3 * s102 + coupling_B_A * s103) - s96 * k49)
+    s105 = (s104 - alpha_A_4 * (k43 + s89 * k44)) / pivot_A_3
+    s106 = k7 * (s103 - (alpha_A_4 * s102 + coupling_B_A * s105)) - s97 * k49
+    s107 = (f_A_x + f_B_x) * k45
+    s108 = (f_A_y + f_B_y) * k45
+    s109 = alpha_A_4 * k55 / pivot_A_3
+    s110 = s109 * s7
+    s111 = cos_phi * k58
+    s112 = s90 * k59 + s91 * k60 - s40 * k58
+    s113 = s95 * k58 + (s92 * k62 + s93 * k63 - s94 * k64) - (k7 * (load_B_3 * s111 + coupling_B_A * s112) - s96 * k61)
+    s114 = (s113 - alpha_A_4 * (k56 + s89 * k57)) / pivot_A_3
+    s115 = k7 * (s112 - (alpha_A_4 * s111 + coupling_B_A * s114)) - s97 * k61
+    s116 = (s96 * k68 - alpha_A_4 * (k66 - s89 * k67)) / pivot_A_3
+    s117 = s97 * k68 + s7 * s116
+    s118 = cos_phi * k40
+    s119 = s40 * k40
+    s120 = s95 * k40 + (s94 * k37 + k38 * (s93 - s92)) - k7 * (load_B_3 * s118 - coupling_B_A * s119)
+    s121 = (s120 - alpha_A_4 * (k69 + s89 * k70)) / pivot_A_3
+    s122 = k7 * (s119 + (alpha_A_4 * s118 + coupling_B_A * s121))
+    s123 = cos_phi * k39
+    s124 = s90 * k37 + s91 * k38 - s40 * k39
+    s125 = s95 * k39 - (k7 * (load_B_3 * s123 + coupling_B_A * s124) - s96 * k73) - alpha_A_4 * (k71 + s89 * k72)
+    s126 = s125 / pivot_A_3
+    s127 = k7 * (s124 - (alpha_A_4 * s123 + coupling_B_A * s126)) - s97 * k73
+    s128 = k74 * (s92 - s93) / pivot_A_3
+    s129 = s7 * s128
+    s130 = s90 * k74
+    s131 = s7 * s130 / pivot_A_3
+    s132 = k7 * (s130 + coupling_B_A * s131)
     return (
         0.0,
         0.0,
@@ -966,41 +1002,41 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        s105 * s74 - s98 * k47 + (s104 * s23 - s97 * k52 - s106),
-        s74 * s109 - s23 * s108,
-        s98 * k59 + s74 * s114 + (s97 * k64 + s23 * s113 - s106),
-        s23 * s115 - s74 * s116,
-        s97 * k37 + s23 * s120 - s74 * s121,
-        s23 * s125 + (s98 * k37 + s74 * s126),
-        s23 * s127 - s74 * s128,
-        s74 * s131 - s23 * s130,
+        s106 * s75 - s99 * k48 + (s105 * s22 - s98 * k53 - s107),
+        s75 * s110 - s22 * s109,
+        s99 * k60 + s75 * s115 + (s98 * k65 + s22 * s114 - s107),
+        s22 * s116 - s75 * s117,
+        s98 * k38 + s22 * s121 - s75 * s122,
+        s22 * s126 + (s99 * k38 + s75 * s127),
+        s22 * s128 - s75 * s129,
+        s75 * s132 - s22 * s131,
         0.0,
-        s100 * k53 - s105 * s77 - (s107 + (s99 * k52 + s104 * s24)),
-        s24 * s108 - s77 * s109,
-        s100 * k59 - s77 * s114 + (s99 * k64 - s24 * s113 - s107),
-        s77 * s116 - s24 * s115,
-        s99 * k37 - s24 * s120 + s77 * s121,
-        s100 * k37 - s77 * s126 - s24 * s125,
-        s77 * s128 - s24 * s127,
-        s24 * s130 - s77 * s131,
+        s101 * k54 - s106 * s78 - (s108 + (s100 * k53 + s105 * s23)),
+        s23 * s109 - s78 * s110,
+        s101 * k60 - s78 * s115 + (s100 * k65 - s23 * s114 - s108),
+        s78 * s117 - s23 * s116,
+        s100 * k38 - s23 * s121 + s78 * s122,
+        s101 * k38 - s78 * s127 - s23 * s126,
+        s78 * s129 - s23 * s128,
+        s23 * s131 - s78 * s132,
         -1.0,
-        s104,
-        -s108,
-        s113,
-        s115,
-        s120,
-        s125,
-        s127,
-        -s130,
+        s105,
+        -s109,
+        s114,
+        s116,
+        s121,
+        s126,
+        s128,
+        -s131,
         0.0,
-        s105 - s104,
-        s108 + s109,
-        s114 - s113,
-        -(s115 + s116),
-        -(s120 + s121),
-        s126 - s125,
-        -(s127 + s128),
-        s130 + s131,
+        s106 - s105,
+        s109 + s110,
+        s115 - s114,
+        -(s116 + s117),
+        -(s121 + s122),
+        s127 - s126,
+        -(s128 + s129),
+        s131 + s132,
         0.0,
     )
 
@@ -1324,6 +1360,11 @@ def potential_energy(t, y, p=None, u=None):
 def effect_powers(t, y, p=None, u=None):
     """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (4,), ('cos', 'sin'), y, p, u)
+
+
+def effect_forces(t, y, p=None, u=None):
+    """Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G."""
+    return _evaluate(_effect_forces, "effect_forces", (4, 4), ('cos', 'sin'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

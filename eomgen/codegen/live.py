@@ -7,6 +7,9 @@ from eomgen.codegen.choice import choose
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System, optimised
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.tree.loads import generalised
+from eomgen.dynamics.tree.vectors import scale, zeros
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.interactive import Pull, interactive, switches_of
 from eomgen.model.model import Model
@@ -20,9 +23,11 @@ from eomgen.scene.joints.base import WORLD
 
 @dataclass(frozen=True)
 class LiveSystem:
-    """The system of an interactive model, with two further outputs: `loads` and `geometry`.
+    """The system of an interactive model, with further outputs: `loads`, `geometry` and
+    `effect_forces`, which leave the pulls out.
 
-    loads       for each load of an effect on a body the names of the effect and of the body
+    loads       for each load of an effect the names of the effect and of the body; one on a joint
+                is drawn as one on its child
     operations  of one call of `derivative` with all effects on and nothing pulled
     saved       operations that each effect takes, by name
     """
@@ -40,9 +45,11 @@ def live_system(model: Model, geometry: Sequence[Formula] = ()) -> LiveSystem:
     record = Recording(live, derived.route, axes=derived.axes)
     system = from_recursion(record, jacobian=False)
     loads, nodes = _loads(record)
+    forces = _forces(record)
     names = {**record.parameters, TIME: record.dynamics.values.time}
     formulas = [evaluate(formula, names, record.scalars) for formula in geometry]
     more = {"loads": record.closed(nodes), "geometry": record.closed(formulas)}
+    more |= {"effect_forces": record.closed(forces)}
     outputs = {
         **system.program.outputs,
         **{name: Output((len(part),), tuple(n.index for n in part)) for name, part in more.items()},
@@ -54,7 +61,7 @@ def live_system(model: Model, geometry: Sequence[Formula] = ()) -> LiveSystem:
 
 
 def _loads(record: Recording) -> tuple[tuple[tuple[str, str], ...], list[Node]]:
-    """For each load on a body: the point of application, the force and the torque, world axes."""
+    """For each load: the point of application, the force and the torque, world axes."""
     d, n = record.dynamics, record.model.dimensions
     found: list[tuple[str, str]] = []
     nodes: list[Node] = []
@@ -62,13 +69,36 @@ def _loads(record: Recording) -> tuple[tuple[tuple[str, str], ...], list[Node]]:
         if isinstance(effect, Pull):
             continue
         for load in effect.loads(d):
-            if isinstance(load, JointLoad) or load.body == WORLD:
-                continue
-            zero = record.scalars.number(0.0)
-            torque = load.torque or (zero,) * (1 if n == 2 else 3)
-            found.append((effect.name, load.body))
-            nodes += [*d.position(load.body, load.at), *load.force, *torque]
+            if isinstance(load, JointLoad):
+                drawn = _at_joint(d, load)
+                if drawn:
+                    found.append((effect.name, d.joint_indices[load.joint].body.name))
+                    nodes += drawn
+            elif load.body != WORLD:
+                torque = load.torque or (record.scalars.number(0.0),) * (1 if n == 2 else 3)
+                found.append((effect.name, load.body))
+                nodes += [*d.position(load.body, load.at), *load.force, *torque]
     return tuple(found), nodes
+
+
+def _at_joint(d: Dynamics, load: JointLoad) -> list[Node]:
+    """A load on a joint as one on its child: the joint's place, force and torque, world axes."""
+    i = d.joint_indices[load.joint].v[load.coordinate]
+    for k, link in enumerate(d.kinematics.links):
+        for axis, j in zip(link.axes, link.v, strict=True):
+            if i == j:
+                along = d.kinematics.to_world(k, scale(load.force, axis.direction))
+                force, torque = (zeros(d.scalars), along)[:: 1 if axis.angular else -1]
+                n = d.dimensions
+                return [*d.origins[k][:n], *force[:n], *(torque if n == 3 else torque[2:])]
+    return []
+
+
+def _forces(record: Recording) -> list[Node]:
+    """The generalised forces of each effect of the scene, row by row."""
+    d, nv = record.dynamics, len(record.v)
+    effects = [effect for effect in record.model.effects if not isinstance(effect, Pull)]
+    return [x for effect in effects for x in generalised(d, effect.loads(d))[:nv]]
 
 
 def _operations(model: Model, program: Program) -> tuple[int, dict[str, int]]:

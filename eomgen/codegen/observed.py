@@ -10,6 +10,7 @@ from eomgen.codegen.recording import Recording
 from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.tree import observables
 from eomgen.dynamics.tree.composite import full
+from eomgen.dynamics.tree.loads import generalised
 from eomgen.dynamics.tree.vectors import Vec, in_space, zeros
 from eomgen.program import differentiate
 from eomgen.program.tape import Node
@@ -69,6 +70,13 @@ def kinetic_slopes(record: Recording) -> list[Node]:
 def effect_powers(record: Recording) -> list[Node]:
     """The power of each effect, W."""
     return [record.dynamics.power(effect) for effect in record.model.effects]
+
+
+def effect_forces(record: Recording) -> list[Node]:
+    """Jᵀ f of each effect's loads, row by row; of drives 0."""
+    d = record.dynamics
+    rows = [generalised(d, effect.loads(d)) for effect in record.model.effects]
+    return [x for row in rows for x in row[: len(record.v)]]
 
 
 def coordinates(record: Recording) -> list[Node]:

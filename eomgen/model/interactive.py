@@ -24,10 +24,13 @@ from eomgen.scene.effects.base import (
     Vector,
 )
 
-OUTPUTS = ("kinetic_energy", "potential_energy", "joint_forces", "body_poses", "body_velocities")
+OUTPUTS = (
+    *("kinetic_energy", "potential_energy", "joint_forces", "body_poses", "body_velocities"),
+    "velocity_force",
+)
 """The outputs of the interactive model."""
-OF_RATTLE = ("mass_matrix", "kinetic_slopes")
-"""Those beside for the steps of leapfrog with constraints."""
+OF_LOOPS = ("mass_matrix", "kinetic_slopes", "constraint_forces")
+"""Those beside with constraints: for the steps of leapfrog, and in the equations of motion."""
 
 
 class Switched(EffectTable):
@@ -115,7 +118,7 @@ def interactive(model: Model) -> Model:
         parameters=(*model.parameters, *added),
         inputs=(*model.inputs, *(i for pull in pulls for i in pull.inputs(model.dimensions))),
         effects=cast(tuple[Effect, ...], (*effects, *pulls)),
-        outputs=(*OUTPUTS, *(OF_RATTLE if model.constraints else ())),
+        outputs=(*OUTPUTS, *(OF_LOOPS if model.constraints else ())),
         form="velocity",
         route=model.route if model.route != "closed" else "auto",
         loops_kept="projected",

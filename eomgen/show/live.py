@@ -13,6 +13,10 @@ from eomgen.run.problem import FloatArray
 from eomgen.run.sizes import mechanism_size
 from eomgen.scene.schema import Simulation
 from eomgen.show.balance import keeps_energy
+from eomgen.show.notation import parsed
+
+LETTERS = {"angle": "θ", "slide": "s", "x": "x", "y": "y", "z": "z"}
+"""Letters of the coordinates of a joint that have no name in the scene, by the end of the name."""
 
 
 class Code(Protocol):
@@ -78,6 +82,8 @@ def live_table(
         ],
         "loads": [{"effect": effect, "body": body} for effect, body in code.loads],
         "operations": code.operations,
+        "rates": [_rate(c.acceleration) for c in live.velocities],
+        "constraints": [name for name, _ in live.rows],
         "pointer": {"first": len(model.inputs), "perBody": 3 if model.dimensions == 2 else 6},
         "initial": list(values),
         "size": float(mechanism_size(units, live.defaults, start)),
@@ -142,6 +148,24 @@ def velocity_rows(
         return columns
 
     return np.column_stack([*coordinates(y), *coordinates(rates)])
+
+
+def _rate(name: str) -> dict[str, Any]:
+    """How the time derivative of a velocity is written: a letter, its dots, and a subscript.
+
+    A name without a letter of its own is written as it is, but for those that joints give.
+    """
+    stem = name.removesuffix("_ddot").removesuffix("_dot")
+    dots = 2 if name.endswith("_ddot") else 1
+    written = parsed(stem)
+    if written.single:
+        return {"letter": written.letter, "dots": dots, "below": ",".join(written.below)}
+    joint, _, last = stem.rpartition("_")
+    if joint and last in LETTERS:
+        return {"letter": LETTERS[last], "dots": dots, "below": joint}
+    if joint and last in ("wx", "wy", "wz") and dots == 1:
+        return {"letter": "ω", "dots": dots, "below": f"{joint},{last[1]}"}
+    return {"letter": stem, "dots": dots, "below": ""}
 
 
 def _integrator(simulation: Simulation) -> dict[str, Any]:

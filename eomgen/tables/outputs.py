@@ -122,6 +122,12 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         units=("W",),
         titles=("power",),
     ),
+    "effect_forces": OutputSpec(
+        ("effects", "nv"),
+        "Generalised force of each of `EFFECT_NAMES`, (effects, nv): their sum is F - G.",
+        "observed:effect_forces",
+        forms=False,
+    ),
     "coordinates": OutputSpec(
         ("nq",),
         "Coordinates of all joints, (nq,): those too that follow from others and are no states.",

@@ -302,6 +302,8 @@ const makeEngine = (mechanism, data) => {
     projected(engine.t, y);
   };
   engine.cost = () => cost;
+  // The time derivative of the present state, under what is held and pulled too.
+  engine.rates = () => problem.f(engine.t, engine.y);
   // Call the derivative for so many ms, so that the browser compiles it; ms of the fastest call.
   engine.warm = (budget) => {
     const until = performance.now() + budget;

@@ -36,6 +36,7 @@ const player = (() => {
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
+  const equations = makeEquations(makeTerms(mechanism, DATA), light);
 
   // ---- What is shown: a time, a state, parameters and inputs ----
 
@@ -43,6 +44,20 @@ const player = (() => {
     if (clock.seen) return clock.seen;
     if (isLive()) return { t: engine.t, y: engine.y, p: engine.p, u: engine.u };
     return { t: clock.time, y: replay.stateAt(clock.time), p: replay.p, u: replay.u };
+  }
+
+  // The time derivative of a state that is shown; null where the force of a held contact, which it contains, is not known.
+  function ratesOf(state) {
+    if (isLive() && !clock.seen) return Float64Array.from(engine.rates());
+    const held = clock.seen ? clock.seen.held : replay.heldAt(state.t);
+    return held ? null : Float64Array.from(mechanism.derivative(state.t, state.y, state.p, state.u));
+  }
+
+  // Light the arrows and the terms of an effect up; null for none.
+  function light(effect) {
+    show.lit = effect;
+    equations.light(effect);
+    redraw();
   }
 
   function energyOf({ t, y, p, u }) {
@@ -64,6 +79,7 @@ const player = (() => {
         stepCost: isLive() ? engine.cost() : NaN,
         single: !isLive() && DATA.run.single,
       });
+      equations?.show(state, () => ratesOf(state), clock.playing);
       overlay.draw(state.t);
       plotting.cursor(state.t);
       if (!isLive()) {
@@ -285,6 +301,7 @@ const player = (() => {
       values.restart();
       redraw();
     },
+    light: (effect) => equations && light(show.lit === effect ? null : effect),
     redraw,
   });
 
@@ -408,7 +425,7 @@ const player = (() => {
   setMode(clock.mode);
   new ResizeObserver(redraw).observe(canvas);
   if (!open(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
-  return { stage, clock, current, goTo, plotting, engine };
+  return { stage, clock, current, goTo, plotting, engine, show };
 })();
 
 // What tests and curious people may read of the page.
@@ -419,6 +436,7 @@ window.eomgen = Object.freeze({
   get state() { return Array.from(player.current().y); },
   get parameters() { return Array.from(player.current().p); },
   get inputs() { return Array.from(player.current().u); },
+  get lit() { return player.show.lit ?? null; }, // the effect whose arrows and terms are marked
   get error() { return player.engine?.error ?? null; },
   get step() { return player.engine ? { method: player.engine.method, seconds: player.engine.dt, ms: player.engine.cost() } : null; },
   // World positions of the centres of mass, m, and where they are in the picture, CSS pixels.

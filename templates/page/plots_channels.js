@@ -109,6 +109,20 @@ const makeChannels = (data, mechanism) => {
     });
   }
 
+  // Those of effects without a switch are drives, whose forces are found with the motion.
+  function addTerms() {
+    if (!has("effectForces")) return;
+    const velocities = data.states.filter(({ kind }) => kind === "velocity");
+    const unitOf = ({ unit }) => (unit === "rad/s" ? "N m" : "N");
+    data.effects.forEach((effect, e) => velocities.forEach((velocity, i) => {
+      if (effect.switch === null) return;
+      const unit = unitOf(velocity);
+      const kin = range(data.effects.length * velocities.length).filter((k) => unitOf(velocities[k % velocities.length]) === unit);
+      add(`effect_forces.${effect.name}.${velocity.name}`, `${effect.name} in the equation of ${velocity.name.replace(/_dot$/, "")}`,
+        "Terms of the equations of motion", unit, "terms", entry(e * velocities.length + i), kin);
+    }));
+  }
+
   function addContacts() {
     const contacts = mechanism?.contacts ?? [];
     const kinOf = (unit) => range(contacts.length).filter((i) => contacts[i].unit === unit);
@@ -126,7 +140,7 @@ const makeChannels = (data, mechanism) => {
       add(`inputs.${name}`, name, "Inputs", unit ?? "", "inputs", entry(k), [k]));
   }
 
-  for (const fill of [addStates, addEnergies, addInputs, addBodies, addJoints, addLoads, addContacts]) fill();
+  for (const fill of [addStates, addEnergies, addInputs, addBodies, addJoints, addLoads, addTerms, addContacts]) fill();
   const call = (name) => (row) => mechanism[name](row.t, row.y, row.p, row.u);
   const families = {
     states: (row) => row.y,
@@ -136,6 +150,7 @@ const makeChannels = (data, mechanism) => {
     velocities: call("bodyVelocities"),
     joints: call("jointForces"),
     loads: call("loads"),
+    terms: call("effectForces"),
     gaps: call("gaps"),
     gapRates: call("gapRates"),
   };

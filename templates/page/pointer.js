@@ -1,12 +1,14 @@
 // `makePointer`: mouse, pen and fingers on the picture. A body is pulled where it is touched, if it
 // can be; beside bodies one finger turns the view in space or moves it in the plane, two fingers move
-// and zoom it.
+// and zoom it. A click on the arrow of an effect lights it up.
 
-const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
+const makePointer = (canvas, stage, { canPull, pull, release, light, redraw }) => {
   const { space } = tools;
+  const CLICK = 4; // pixels that a click may move
   const touches = new Map(); // where each finger is
   let grip = null; // {body, at, world} of the pulled body
   let spread = 0; // distance of two fingers
+  let arrow = null; // {effect, spot} that was pressed and has not been dragged from
   let [chosen, aim] = [-1, [0, 0]]; // the body taken by keys, and where it is pulled to
 
   const spotOf = (event) => {
@@ -18,16 +20,24 @@ const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
     canvas.setPointerCapture(event.pointerId);
     touches.set(event.pointerId, spotOf(event));
     if (touches.size > 1) {
+      arrow = null;
       letGo();
       spread = distance();
       return;
     }
-    if (event.button === 0 && !event.shiftKey && canPull()) grip = stage.pick(...spotOf(event));
-    if (grip) {
-      canvas.dataset.grip = grip.body;
-      pull(grip, grip.world);
-    }
+    if (event.button !== 0 || event.shiftKey) return;
+    const spot = spotOf(event);
+    const effect = stage.effectAt(...spot);
+    if (effect) arrow = { effect, spot };
+    else takeAt(spot);
   });
+
+  function takeAt(spot) {
+    if (canPull()) grip = stage.pick(...spot);
+    if (!grip) return;
+    canvas.dataset.grip = grip.body;
+    pull(grip, grip.world);
+  }
 
   const distance = () => {
     const [a, b] = [...touches.values()];
@@ -38,8 +48,14 @@ const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
     const before = touches.get(event.pointerId);
     const here = spotOf(event);
     if (!before) {
-      if (canPull() && event.pointerType === "mouse") canvas.classList.toggle("over", Boolean(stage.pick(...here)));
+      if (event.pointerType === "mouse") canvas.classList.toggle("over", Boolean(stage.effectAt(...here) || (canPull() && stage.pick(...here))));
       return;
+    }
+    if (arrow) {
+      const { spot } = arrow;
+      if (Math.hypot(here[0] - spot[0], here[1] - spot[1]) <= CLICK) return;
+      arrow = null;
+      takeAt(spot);
     }
     touches.set(event.pointerId, here);
     const [dx, dy] = [here[0] - before[0], here[1] - before[1]];
@@ -63,6 +79,8 @@ const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
   for (const name of ["pointerup", "pointercancel"]) {
     canvas.addEventListener(name, (event) => {
       touches.delete(event.pointerId);
+      if (arrow && name === "pointerup") light(arrow.effect);
+      arrow = null;
       if (!touches.size) letGo();
     });
   }

@@ -14,6 +14,7 @@ const makeReplay = (mechanism) => {
   const state = new Float64Array(ny);
   const slopes = [new Float64Array(ny), new Float64Array(ny)];
   const replay = { t, y, p, u, begin: t[0], end: t[last], rows: t.length, row, stateAt, neighbour, held: null };
+  replay.heldAt = (time) => Boolean(replay.held?.[rowBefore(time)]);
 
   // The last row at or before a time, but not the last of all.
   function rowBefore(time) {

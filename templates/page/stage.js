@@ -224,6 +224,9 @@ const makeStage = (canvas, mechanism) => {
     return space ? found[0] : found.reduce((a, b) => (b.object.renderOrder > a.object.renderOrder ? b : a));
   }
 
+  // The effect whose arrow is at a place of the picture, or null.
+  stage.effectAt = (x, y) => arrows.effectAt([x, y], view.toScreen);
+
   // The body at a place of the picture: {body, at: the point in its axes, world}, or null.
   stage.pick = (x, y) => {
     if (!now) return null;

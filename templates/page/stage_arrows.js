@@ -10,6 +10,9 @@ const makeArrows = (scene, mechanism) => {
     velocities: { unit: "m/s", color: "#2a9d5c", name: "velocity" },
     reactions: { unit: "N", color: "#e08a00", name: "joint force" },
   };
+  const BY_EFFECTS = new Set(["forces", "torques"]);
+  const LIT = "#1f7ae0";
+  const NEAR = 7; // pixels from an arrow within which a pointer means it
   const [BAR, USUAL, LONGEST] = [60, 100, 500]; // pixels: of the legend, of a large value, at most
   const [HEAD, NECK] = [11, 4.5]; // length and radius of an arrowhead, pixels
   const SMALLEST = 3; // shorter arrows are not drawn, pixels
@@ -62,9 +65,10 @@ const makeArrows = (scene, mechanism) => {
   // ---- Drawing ----
 
   const cone = new THREE.ConeGeometry(1, 1, 20).translate(0, -0.5, 0); // its tip is the origin
-  const drawn = Object.fromEntries(Object.entries(KINDS).map(([kind, { color }]) => {
-    const shaft = lines.make({ color, width: 2.6, pieces: true });
-    const most = Math.max(1, DATA.loads.length, DATA.bodies.length, joints.length);
+  const sets = [...Object.entries(KINDS).map(([kind, { color }]) => [kind, color, 2.6]), ["lit", LIT, 4]];
+  const drawn = Object.fromEntries(sets.map(([kind, color, width]) => {
+    const shaft = lines.make({ color, width, pieces: true });
+    const most = Math.max(1, 2 * DATA.loads.length, DATA.bodies.length, joints.length);
     const heads = new THREE.InstancedMesh(cone, new THREE.MeshBasicMaterial({ color, depthTest: false }), most);
     shaft.material.depthTest = false;
     for (const object of [shaft, heads]) {
@@ -77,6 +81,7 @@ const makeArrows = (scene, mechanism) => {
     return [kind, { shaft, heads }];
   }));
   const spare = new THREE.Object3D();
+  let reach = []; // {effect, points} of the arrows of effects that are drawn
 
   // An arrow from a point; the points of its shaft, and its tip and direction.
   function straight(from, along, length, pixel) {
@@ -97,20 +102,25 @@ const makeArrows = (scene, mechanism) => {
     return [points, add(spot(1.5 * Math.PI), scaled(ahead, HEAD * 0.8 * pixel)), ahead];
   }
 
-  function drawKind(kind, now) {
-    const { shaft, heads } = drawn[kind];
-    const all = FOUND[kind](now).map(([from, v]) => [from, v, Math.hypot(...v)]).filter(([, , size]) => Number.isFinite(size));
-    const largest = Math.max(0, ...all.map(([, , size]) => size));
+  // The arrows of a kind, {kind, from, v, size, effect}; the longest may change the scale.
+  function arrowsOf(kind, now) {
+    const all = FOUND[kind](now).map(([from, v], i) => ({ kind, from, v, size: Math.hypot(...v), effect: BY_EFFECTS.has(kind) ? DATA.loads[i].effect : null }))
+      .filter(({ size }) => Number.isFinite(size));
+    const largest = Math.max(0, ...all.map(({ size }) => size));
     if (largest > 1.5 * values[kind]) values[kind] = values[kind] > 0 ? Math.min(largest, 1.05 * values[kind]) : largest;
-    const factor = BAR / barOf(kind);
+    return all;
+  }
+
+  function drawSet({ shaft, heads }, arrows, { pixel }) {
     const points = [];
     let count = 0;
-    for (const [from, v, size] of all) {
-      const length = Math.min(size * factor, LONGEST);
+    for (const { kind, from, v, size, effect } of arrows) {
+      const length = Math.min((size * BAR) / barOf(kind), LONGEST);
       if (length < SMALLEST) continue;
-      const [shafts, tip, along] = (kind === "torques" ? bent : straight)(from, unit(v), length, now.pixel);
+      const [shafts, tip, along] = (kind === "torques" ? bent : straight)(from, unit(v), length, pixel);
       points.push(...shafts);
-      const shrink = Math.min(1, length / HEAD) * now.pixel;
+      if (effect) reach.push({ effect, points: [...shafts, ...shafts.slice(-3), ...tip] });
+      const shrink = Math.min(1, length / HEAD) * pixel;
       shapes.turnTo(spare, along);
       spare.position.set(...tip);
       spare.scale.set(NECK * shrink, HEAD * shrink, NECK * shrink);
@@ -125,16 +135,43 @@ const makeArrows = (scene, mechanism) => {
     heads.instanceMatrix.needsUpdate = true;
   }
 
+  // Distance on the screen from a spot to a piece of an arrow.
+  function distance(spot, a, b) {
+    const [along, to] = [b.map((x, k) => x - a[k]), spot.map((x, k) => x - a[k])];
+    const square = along[0] ** 2 + along[1] ** 2;
+    const part = square > 0 ? Math.min(Math.max((to[0] * along[0] + to[1] * along[1]) / square, 0), 1) : 0;
+    return Math.hypot(to[0] - part * along[0], to[1] - part * along[1]);
+  }
+
+  // The effect of the arrow at a spot of the picture; null if there is none within NEAR pixels.
+  function effectAt(spot, toScreen) {
+    let [least, found] = [NEAR, null];
+    for (const { effect, points } of reach) {
+      for (let i = 0; i < points.length; i += 6) {
+        const far = distance(spot, toScreen(points.slice(i, i + 3)), toScreen(points.slice(i + 3, i + 6)));
+        if (far < least) [least, found] = [far, effect];
+      }
+    }
+    return found;
+  }
+
   return {
     calibrate,
     // What the legend says: name, unit, colour, the value of a bar, and the bar's length in pixels.
-    legend: (show) => Object.entries(KINDS).filter(([kind]) => show[kind] && values[kind] > 0)
+    legend: (show) => Object.entries(KINDS).filter(([kind]) => (show[kind] || (show.lit && BY_EFFECTS.has(kind))) && values[kind] > 0)
       .map(([kind, about]) => ({ kind, ...about, value: barOf(kind), pixels: BAR })),
+    // `show.lit` is the effect whose arrows are drawn in any case, in a colour of their own.
     draw(now, show) {
+      const lit = [];
+      reach = [];
       for (const kind of Object.keys(KINDS)) {
-        if (show[kind]) drawKind(kind, now);
-        else drawn[kind].shaft.visible = drawn[kind].heads.visible = false;
+        const wanted = show[kind] || (show.lit && BY_EFFECTS.has(kind));
+        const all = wanted ? arrowsOf(kind, now) : [];
+        lit.push(...all.filter(({ effect }) => effect && effect === show.lit));
+        drawSet(drawn[kind], show[kind] ? all.filter(({ effect }) => !effect || effect !== show.lit) : [], now);
       }
+      drawSet(drawn.lit, lit, now);
     },
+    effectAt,
   };
 };

@@ -91,6 +91,35 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     assert_close(states, at.solver.state_rates)
 
 
+HELD = """
+name = "held"
+bodies = [{ name = "rod", mass = 2.0, inertia_com = 0.3 }, { name = "tip", mass = 0.5 }]
+joints = [
+    { name = "pin", type = "revolute", parent = "world", child = "rod", r_child = [0.4, 0], \
+coordinate = "q_1" },
+    { name = "rail", type = "prismatic", parent = "rod", child = "tip", axis = [0.6, 0.8] },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "spring", name = "rope", body_1 = "world", at_1 = [1, 0.2], body_2 = "tip", \
+stiffness = 3.0, rest_length = 0.1 },
+    { type = "joint_damper", name = "oil", joint = "pin", damping = 0.7 },
+]
+"""
+
+
+def test_generalised_forces_of_each_effect() -> None:
+    """A row of `effect_forces` is F - G as derived of the scene with that effect alone."""
+    scene = parse_scene(HELD)
+    module: Any = eomgen.load(eomgen.generate(scene, outputs=["effect_forces"]))
+    y = np.array([0.7, 0.3, -0.9, 0.4])
+    for effect, row in zip(scene.effects, module.effect_forces(0.0, y), strict=True):
+        derived = eomgen.derive(scene.replaced(effects=(effect,)))
+        values = dict(zip(map(real, module.STATES), y.tolist(), strict=True))
+        forces = derived.written_out(derived.F - derived.G).subs(values)
+        assert_close(row, np.array(forces.evalf(), dtype=float), 1e-12)
+
+
 STEERED = """
 name = "steered"
 dimensions = {n}

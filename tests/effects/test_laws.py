@@ -446,6 +446,19 @@ def test_energy_changes_by_the_power_of_applied_forces(m: Moment) -> None:
     assert apart(flow - m.slope_of_stored(m.v), power, *terms) < EXACT
 
 
+def test_forces_of_effects_are_all_that_moves_it(m: Moment) -> None:
+    """Their sum is F - G, so that M v̇ + V is it; Q v is the power of each, but of drives."""
+    forces, powers = m["effect_forces"], m["effect_powers"]
+    F, G, V = m["applied_force"], m["gravity_force"], m["velocity_force"]
+    forces = forces.reshape(len(m.model.effects), m.nv)
+    pull, terms = m["mass_matrix"] @ m.vd, (forces.ravel(), V)
+    assert apart(forces.sum(axis=0), F - G, F, G) < EXACT
+    assert apart(pull + V, forces.sum(axis=0), pull, *terms) < EXACT
+    for effect, force, power in zip(m.model.effects, forces, powers, strict=True):
+        if not effect.prescribes():
+            assert apart(force @ m.v, power, powers, forces.ravel()) < EXACT
+
+
 def test_kinetic_energy_grows_by_the_power_of_effects(m: Moment) -> None:
     """dT/dt = Σ power of all effects, their drives and weights among them, as time goes on."""
     powers, energy = m["effect_powers"], m["kinetic_energy"]

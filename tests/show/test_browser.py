@@ -139,6 +139,38 @@ def corners(path: str) -> np.ndarray:
     return np.array([tuple(map(float, x.split(","))) for x in re.findall(r"[-\d.]+,[-\d.]+", path)])
 
 
+def test_a_force_and_its_terms_light_each_other_up(browser: Any, tmp_path: Path) -> None:
+    """A press on a term marks the arrows of its effect; a click on an arrow its terms."""
+    run = eomgen.simulate("cart_pole", t_end=0.5, samples=21)
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as found:
+        page = found.page
+        term = page.locator("button.term[data-effect=gravity]:visible")
+        found.at(0.2)
+        sides = (
+            page.locator(".equation")
+            .nth(1)
+            .evaluate(
+                """(e) => [...e.querySelectorAll(".term:not(:empty)")].filter((x) => x.offsetParent)
+              .map((x) => [x.matches(".inertia"), x.querySelector(".value").textContent])"""
+            )
+        )
+        left, right = ([float(x.replace("−", "-")) for own, x in sides if own == k] for k in (1, 0))
+        assert sum(left) == pytest.approx(sum(right), rel=1e-3) and len(sides) > 3
+        term.press("Enter")
+        assert term.get_attribute("aria-pressed") == "true" and found.lit == "gravity"
+        page.click("#show-menu summary")
+        page.check("#show-forces")
+        term.press("Enter")
+        assert found.lit is None
+        found.drawn()
+        x, y = found.screen[1]
+        box = page.locator("#stage").bounding_box()
+        page.mouse.click(box["x"] + x, box["y"] + y + 15)
+        assert found.lit == "gravity" and found.mode == "replay"
+        assert term.get_attribute("aria-pressed") == "true"
+
+
 def test_a_state_is_typed_and_a_link_keeps_it(browser: Any, tmp_path: Path) -> None:
     """The motion stands there; a link opens the same state, parameters, effects, method and plots.
     What a link says of nothing that is known changes nothing.

@@ -70,13 +70,22 @@ class FreeBodies(VirtualWork):
         return sizes
 
     @cached_property
+    def _pushes(self) -> list[tuple[Array, Array]]:
+        return [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
+
+    @cached_property
+    def effect_forces(self) -> tuple[Array, Array]:
+        """The generalised forces of each effect's loads, and the sizes of their terms."""
+        forces, sizes = (np.array([p[k][: self.nv] for p in self._pushes]) for k in (0, 1))
+        return forces, sizes
+
+    @cached_property
     def powers(self) -> tuple[Array, Array]:
         """The power of each effect's loads, W, and the sizes of its terms; 0 for drives."""
-        pushes = [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
         speeds = abs(self.rates)
         return (
-            extended([push @ self.rates for push, _ in pushes]),
-            extended([sizes @ speeds for _, sizes in pushes]),
+            extended([push @ self.rates for push, _ in self._pushes]),
+            extended([sizes @ speeds for _, sizes in self._pushes]),
         )
 
     @cached_property

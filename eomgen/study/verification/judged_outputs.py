@@ -14,6 +14,9 @@ from eomgen.study.verification.losses import Loss, loss_of, rest_of
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.whole import Viewed, names_of
 
+OF_EFFECTS = ("effect_powers", "effect_forces")
+"""Outputs that free bodies know with the sizes of their terms."""
+
 
 def on_tree(free: FreeBodies, vd: Array) -> Array:
     """M v̇ + h - F."""
@@ -145,10 +148,11 @@ def _quantities(
         "potential_energy": potential,
         "momentum": free.momentum_sizes,
         "effect_powers": free.effect_powers[1],
+        "effect_forces": free.effect_forces[1],
         "body_poses": np.concatenate([extended(one), free.reach * extended(one[:, :, :1])], axis=2),
     }
     if not free.model.effects:
-        del scales["effect_powers"]
+        del scales["effect_powers"], scales["effect_forces"]
     scales |= _constraint_scales(free)
     found = {}
     for name, scale in scales.items():
@@ -159,7 +163,7 @@ def _quantities(
                 values.append(np.array(places).reshape(-1, 3, 4))
             else:
                 value = getattr(f, name)
-                values.append(extended(value[0] if name == "effect_powers" else value))
+                values.append(extended(value[0] if name in OF_EFFECTS else value))
         if name == "momentum" and free.dimensions == 2:
             values, scale = [x[[0, 1, 5]] for x in values], scale[[0, 1, 5]]
         found[name] = (values, extended(scale))

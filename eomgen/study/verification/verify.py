@@ -55,6 +55,7 @@ OUTPUTS = (
     "kinetic_energy",
     "potential_energy",
     "effect_powers",
+    "effect_forces",
     "momentum",
     "body_poses",
 )
