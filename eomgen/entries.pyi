@@ -25,6 +25,27 @@ def Ball(
     """
     ...
 
+def Belt(
+    *,
+    name: str,
+    body_1: str,
+    body_2: str,
+    carrier: str | None = ...,
+    phase: float | str = ...,
+    radius_1: float | str,
+    radius_2: float | str,
+    crossed: bool = ...,
+) -> Table:
+    """A belt or chain that does not slip connects discs of two bodies, which turn about axes that
+    their `carrier` holds, in the same sense, or in opposite senses if it is `crossed`. The discs
+    are around the axes.
+
+    The angles are those of joints, from the carrier. The belt is tight on both sides: the
+    multiplier is the difference of its two tensions, N, counted in the sense in which `body_1`
+    turns.
+    """
+    ...
+
 def Body(
     *,
     name: str,
@@ -217,7 +238,8 @@ def Coupling(
     equals: float | str,
 ) -> Table:
     """A coordinate follows others: `coordinate` = `equals`, a formula of coordinates, `t` and
-    parameters. Gears, racks, screws, belts, differentials and mimic joints are couplings.
+    parameters. Racks, screws, differentials and mimic joints are couplings; see also `gear` and
+    `belt`.
 
     The multiplier is the generalised force on `coordinate`, N m or N.
     """
@@ -416,6 +438,33 @@ def Free(
     In the plane its coordinates are x, y of the centre of mass in world axes, and its angle. In
     space they are x, y, z of the centre of mass and the unit quaternion of world_R_body; its
     velocities are that of the centre of mass in world axes and the angular velocity in body axes.
+    """
+    ...
+
+def Gear(
+    *,
+    name: str,
+    body_1: str,
+    body_2: str,
+    carrier: str | None = ...,
+    phase: float | str = ...,
+    teeth_1: float | str | None = ...,
+    teeth_2: float | str | None = ...,
+    radius_1: float | str | None = ...,
+    radius_2: float | str | None = ...,
+    ratio: float | str | None = ...,
+    inside: bool = ...,
+) -> Table:
+    """Two gears mesh: `body_1` and `body_2` turn about axes that their `carrier` holds, in opposite
+    senses, or `inside` a ring in the same sense. Give the numbers of `teeth`, the radii, or the
+    `ratio`, which is the number of turns of `body_1` for one of `body_2`.
+
+    The angles are those of joints, from the carrier, about the axes of the joints: axes that point
+    the same way for spur gears; for bevel gears choose `inside` by the axes. A carrier that turns
+    makes it a planetary gear. The world may be `body_2`, as a fixed ring gear.
+
+    The multiplier is the torque on `body_1` that the gears transmit, N m; with radii it is the
+    force between the teeth, N, counted in the sense in which `body_1` turns.
     """
     ...
 
@@ -742,6 +791,27 @@ def Prismatic(
     """The child translates along `axis` and does not rotate relative to the parent."""
     ...
 
+def Pulley(
+    *,
+    name: str,
+    length: float | str | None = ...,
+    body: str,
+    at: Sequence[float | str] = ...,
+    radius: float | str,
+    body_1: str,
+    at_1: Sequence[float | str] = ...,
+    body_2: str,
+    at_2: Sequence[float | str] = ...,
+    winds: Literal["clockwise", "counterclockwise"] = ...,
+) -> Table:
+    """A rope runs from a point of `body_1` over the disc of `radius` about the point `at` of `body`
+    to a point of `body_2`, and turns the disc: it does not slip. It is a `rope` over one disc that
+    grips, in the plane.
+
+    The multipliers are the tensions on the side of `body_1` and on that of `body_2`, N.
+    """
+    ...
+
 def Revolute(
     *,
     name: str,
@@ -807,6 +877,43 @@ def Rolling(
     becomes negative, the surface holds the body: it does not lift off. The rows `<name>_along`, in
     space `<name>_along_1` and `<name>_along_2`, restrict velocities only; their multipliers are the
     components of the friction that rolling needs. A disc that lies flat is singular.
+    """
+    ...
+
+def Rope(
+    *,
+    name: str,
+    length: float | str | None = ...,
+    through: Sequence[Table | Mapping[str, Any]],
+) -> Table:
+    """A massless rope of fixed `length` that is taut along its way `through` points, rings and
+    discs: see `points of ropes`. Its spans are straight, and discs are left along tangents, in the
+    plane. A load on a rope through a ring, a block and tackle, a string that winds on a drum.
+
+    The length is that of the spans and of the arcs on discs between the ends; if it is absent, it
+    is that of the start, and so it is for a rope that ends on a drum. The rope is to touch each
+    disc that it goes round, and to leave one that takes it along in a direction within half a turn
+    from that at the start.
+
+    The multiplier is the tension, N. It stays taut even if that becomes negative, as a rod would;
+    with `tension_only` a `spring` is slack then. Where a disc takes it along, each section has
+    a tension of its own: rows `<name>_1`, `<name>_2`, ….
+    """
+    ...
+
+def RopePoint(
+    *,
+    body: str,
+    at: Sequence[float | str] = ...,
+    radius: float | str | None = ...,
+    winds: Literal["clockwise", "counterclockwise"] | None = ...,
+    grips: bool = ...,
+) -> Table:
+    """What a rope is held by or runs through: a point or a ring, or with `radius` a disc about it,
+    which it goes round in the sense `winds`, seen along the rope from its first end to its last.
+
+    The rope slides through rings and over discs without friction. A disc that `grips` takes it
+    along without slip; so does a disc at an end, a drum, on which it is wound.
     """
     ...
 

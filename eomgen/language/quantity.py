@@ -162,14 +162,15 @@ def name_quantities(
     conditions: list[Condition] = []
     for field, info in type(table).model_fields.items():
         extra, value = info.json_schema_extra, getattr(table, field)
-        if isinstance(value, dict) and any(isinstance(x, Table) for x in value.values()):
-            fields[field] = {}
-            for key, inner in value.items():
-                at = f"{location}.{info.alias or field}.{key}"
-                found = name_quantities(inner, f"{prefix}_{key}", at, known, motion, sliding)
-                fields[field][key] = inner.replaced(**found[0])
-                parameters += found[1]
-                conditions += found[2]
+        inner = dict[str, Table]()
+        for at, key, one in _tables_in(value):
+            where = f"{location}.{info.alias or field}{at}"
+            found = name_quantities(one, f"{prefix}_{key}", where, known, motion, sliding)
+            inner[key] = one.replaced(**found[0])
+            parameters += found[1]
+            conditions += found[2]
+        if inner:
+            fields[field] = inner if isinstance(value, dict) else tuple(inner.values())
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
         named: list[Formula] = []
@@ -196,6 +197,16 @@ def name_quantities(
         if named or isinstance(value, tuple | dict):
             fields[field] = _like(value, named)
     return fields, parameters, conditions
+
+
+def _tables_in(value: Any) -> Iterator[tuple[str, str, Table]]:
+    """The tables in a table by names, or in a list, where each is, and what names it."""
+    if isinstance(value, dict):
+        found = [(f".{key}", key, x) for key, x in value.items()]
+    else:
+        listed = value if isinstance(value, tuple) else ()
+        found = [(f"[{i}]", str(i + 1), x) for i, x in enumerate(listed)]
+    return (entry for entry in found if isinstance(entry[2], Table))
 
 
 def _like(value: Any, named: Sequence[Formula]) -> Any:

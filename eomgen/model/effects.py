@@ -14,6 +14,7 @@ from eomgen.model.frames import effect_from_centres
 from eomgen.model.inputs import own_inputs
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
+from eomgen.model.ways import TreeWays
 from eomgen.scene.constraints import ConstraintTable
 from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import EffectTable, ExtraState, Input
@@ -89,7 +90,9 @@ def constraints_in_force(
     pairs = [resolver.resolved(c, location.format(i), ()) for i, c in enumerate(scene.constraints)]
     for i, (constraint, _) in enumerate(pairs):
         _check_formulas(constraint, location.format(i), bodies, scope)
-    return tuple(c for c, _ in pairs), joined(bindings for _, bindings in pairs)
+    ways = TreeWays(bodies, scene.dimensions)
+    placed = tuple(c.placed(ways, location.format(i)) for i, (c, _) in enumerate(pairs))
+    return placed, joined(bindings for _, bindings in pairs)
 
 
 def _check_formulas(
@@ -200,7 +203,7 @@ def _names_in(
     effect: EffectTable, fields: Sequence[str], location: str
 ) -> Iterator[tuple[str, str]]:
     """Each name that some fields hold, with its location. A field is a name, a list, a table by
-    names, or one of tables that name a `body`.
+    names, or a list or a table of tables that name a `body`.
     """
     for field in fields:
         value = getattr(effect, field)
@@ -212,4 +215,6 @@ def _names_in(
                 at, within = f"{location}.{field}.{key}", isinstance(inner, Table)
                 yield (inner.body, f"{at}.body") if within else (key, at)
         elif value is not None:
-            yield from ((name, f"{location}.{field}[{i}]") for i, name in enumerate(value))
+            for i, entry in enumerate(value):
+                at, within = f"{location}.{field}[{i}]", isinstance(entry, Table)
+                yield (entry.body, f"{at}.body") if within else (entry, at)

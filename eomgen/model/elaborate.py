@@ -207,7 +207,8 @@ def _body(link: Link, scope: Scope, dimensions: int, centres: Centres) -> tuple[
     if given.com:
         at = f"{link.location}.com"
         given = given.replaced(com=with_components(given.com, ZERO, dimensions, at))
-    table, of_body = bind(given, given.name, link.location, scope)
+    seen = given.replaced(shapes=())  # no parameters: no equation uses shapes
+    table, of_body = bind(seen, given.name, link.location, scope)
     inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
     at = f"{link.location}.inertia_com"

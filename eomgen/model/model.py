@@ -9,6 +9,7 @@ from itertools import accumulate
 
 from eomgen.base.displays import Displayed
 from eomgen.base.frozen import FrozenDict
+from eomgen.language.base import Table
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Formula, evaluate
 from eomgen.language.quantity import Parameter
@@ -327,5 +328,7 @@ def _formulas(value: object) -> Iterator[Formula]:
     if isinstance(value, tuple):
         for part in value:
             yield from _formulas(part)
+    elif isinstance(value, Table):
+        yield from _formulas(tuple(getattr(value, field) for field in type(value).model_fields))
     elif isinstance(value, Formula):
         yield value

@@ -17,7 +17,7 @@ TABLES = {"joints": Joint, "effects": Effect, "constraints": AnyConstraint}
 """The tables whose types differ, with the unions of their entries."""
 REMARKS = dict.fromkeys(
     ("rope", "cable", "string"),
-    " and tension_only = true, or a coupling if it is taut around a pulley",
+    ", or a spring with tension_only = true if it may be slack",
 )
 """What else belongs to a word that means a type."""
 

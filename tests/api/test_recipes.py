@@ -48,7 +48,7 @@ EDITS = {
         f"{SCENE}constraints/level.py": OURS / "constraints.py",
         f"{SCENE}constraints/__init__.py": [
             ("from eomgen.scene.constraints.k", "from eomgen.scene.constraints.level import Level"),
-            ("    Coupling | Dist", "    Level |"),
+            ("    Belt | Coup", "    Level |"),
         ],
     },
     "an output": {

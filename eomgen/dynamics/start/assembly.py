@@ -29,6 +29,7 @@ from eomgen.dynamics.start.constraint_equations import (
 )
 from eomgen.dynamics.start.walks import timed
 from eomgen.model.model import Model
+from eomgen.scene.constraints import Constraint, ConstraintTable
 from eomgen.scene.joints.base import Coordinate
 
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
@@ -56,8 +57,8 @@ def assembled(model: Model) -> Model:
     """
     if not model.constraints:
         return model
+    model = _begun(model)
     mechanism = ConstraintEquations.of(model)
-    _check_defined(mechanism, np.array(model.initial_q))
     _check_linear(mechanism, np.array(model.initial_q))
     q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
@@ -87,16 +88,25 @@ def assembled(model: Model) -> Model:
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
 
 
-def _check_defined(mechanism: ConstraintEquations, start: Array) -> None:
-    """Raise `SceneError` if a constraint has no value at the start."""
-    for constraint in mechanism.model.constraints:
+def _begun(model: Model) -> Model:
+    """The model with constraints that know what of its start they keep.
+
+    Raises `SceneError` if one has no value there.
+    """
+    d = ConstraintEquations.of(model).dynamics(np.array(model.initial_q))
+    found = list[Constraint]()
+    for constraint in model.constraints:
         try:
-            list(constraint.rows(mechanism.dynamics(start)))
+            if isinstance(constraint, ConstraintTable):
+                constraint = constraint.begun(d)
+            list(constraint.rows(d))
         except (ArithmeticError, ValueError):
             raise SceneError(
                 f"initial.q: constraint '{constraint.name}' has no direction at this start, as "
-                "where a disc lies flat; give another"
+                "where a disc lies flat, or a rope has no way; give another"
             ) from None
+        found.append(constraint)
+    return replace(model, constraints=tuple(found))
 
 
 def _check_linear(mechanism: ConstraintEquations, q: Array) -> None:

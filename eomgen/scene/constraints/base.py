@@ -1,8 +1,8 @@
 """The interface of constraints: scalar equations of the motion, each kept by a multiplier."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
@@ -55,6 +55,18 @@ class Linkage(Mechanism, Protocol):
         """A formula of `names`, t and parameters: its value, and its derivatives by each of the
         names, in order, and by t.
         """
+
+
+class Ways(Protocol):
+    """What constraints can read of the tree of bodies before there is a motion."""
+
+    def turn(self, body: str, other: str, location: str) -> Formula:
+        """The angle of a body from another one, rad: the sum of the angles of the joints on the way
+        between them. Raises `SceneError` for a joint with another rotation.
+        """
+
+    def parent(self, body: str) -> str:
+        """The body to which the joint of a body is attached."""
 
 
 @dataclass(frozen=True)
@@ -124,10 +136,23 @@ class ConstraintTable(EffectTable):
     coordinate_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a coordinate."""
 
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """Its fields, and what it took of the tree and of the start: a model's digest has these."""
+        yield from super().__repr_args__()
+        yield from (self.__pydantic_private__ or {}).items()
+
     @property
     def internal(self) -> bool:
         """Whether its forces change neither the momentum nor the moment of momentum of all."""
         return False
+
+    def placed(self, ways: Ways, location: str) -> Self:
+        """The constraint with what it needs of the tree of bodies."""
+        return self
+
+    def begun(self, mechanism: Linkage) -> Self:
+        """The constraint with the lengths and angles of the start that it keeps."""
+        return self
 
     def loop_part(self) -> LoopPart | None:
         """What determines the coordinates of a planar loop in closed form; None for nothing."""

@@ -15,7 +15,8 @@ from eomgen.scene.effects.base import JointLoad
 
 class Coupling(ConstraintTable):
     """A coordinate follows others: `coordinate` = `equals`, a formula of coordinates, `t` and
-    parameters. Gears, racks, screws, belts, differentials and mimic joints are couplings.
+    parameters. Racks, screws, differentials and mimic joints are couplings; see also `gear` and
+    `belt`.
 
     The multiplier is the generalised force on `coordinate`, N m or N.
     """
@@ -44,7 +45,7 @@ equals = "-2*shoulder_angle + 0.1"
 
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """`coordinate` - `equals`."""
-        yield _position_row(mechanism, Apply("-", (Name(self.coordinate), self.equals)))
+        yield position_row(mechanism, Apply("-", (Name(self.coordinate), self.equals)))
 
 
 class Equation(ConstraintTable):
@@ -81,7 +82,7 @@ position = "shoulder_angle + elbow_angle"
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """The formula itself."""
         if self.position is not None:
-            yield _position_row(mechanism, self.position)
+            yield position_row(mechanism, self.position)
         else:
             assert self.velocity is not None
             partials = mechanism.partials(self.velocity, "velocities")
@@ -89,7 +90,7 @@ position = "shoulder_angle + elbow_angle"
             yield Row(None, loads, partials.at_rest)
 
 
-def _position_row(mechanism: Linkage, formula: Formula) -> Row:
+def position_row(mechanism: Linkage, formula: Formula) -> Row:
     """The row of a formula of positions and time."""
     partials = mechanism.partials(formula, "positions")
     loads = tuple(JointLoad(joint, slope, i) for joint, i, slope in partials.slopes)

@@ -141,7 +141,8 @@ def _slopes(
     if not np.isfinite(given).all():
         return float("inf"), float("inf")
     made = extended(given), direction, change
-    whole = _ulps_of(*made, len(model.coordinates), model.velocities)
+    left = rest_of(model) * _size_of_terms(free, direction) if model.constraints else mpfr(0)
+    whole = _ulps_of(*made, len(model.coordinates), model.velocities, left=left)
     here = dict(zip(names_of(model), state.y, strict=True))
     return whole, _rows(*made, roundings, state, here, rest_of(model), 0.0)
 
@@ -195,9 +196,11 @@ def _ulps_of(
     nq: int,
     velocities: Sequence[Coordinate],
     least: Any = 0.0,
+    left: Any = 0.0,
 ) -> float:
     """The error of slopes along a direction, in ulps of their terms, those of velocities of a unit
-    together; `least` is a size of the terms of these, which may cancel.
+    together; `least` is a size of the terms of these, which may cancel, and `left` what 60 digits
+    leave of these.
     """
     scale = abs(slopes) @ abs(direction) + abs(change)
     scale[nq : nq + len(velocities)] += mpfr(least)
@@ -205,7 +208,7 @@ def _ulps_of(
     for unit in dict.fromkeys(rows):
         group = [nq + i for i, other in enumerate(rows) if other == unit]
         scale[group] = max(scale[group])
-    return ulps(slopes @ direction - change, scale)
+    return ulps(np.maximum(abs(slopes @ direction - change) - left, 0), scale)
 
 
 def _slopes_in_closed_form(
@@ -289,9 +292,12 @@ def _change_in_closed_form(
     change = _change_along(model, state, y, free, whole)
     if change is None:
         return None
-    # The size of terms of ω v, which may cancel: β is a second difference of positions.
-    least = max(abs(free.rates)) * (max(abs(free.rates)) + max(abs(whole[at])))
-    return change[kept], least
+    return change[kept], _size_of_terms(free, whole[at])
+
+
+def _size_of_terms(free: FreeBodies, direction: Array) -> Extended:
+    """The size of terms of ω v, which may cancel: β is a second difference of positions."""
+    return max(abs(free.rates)) * (max(abs(free.rates)) + max(abs(direction)))
 
 
 def _following(free: FreeBodies, names: Sequence[str], v: Array, more: Array) -> Array:

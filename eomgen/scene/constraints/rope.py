@@ -1,0 +1,222 @@
+"""A rope of fixed length: through points and rings, over discs, and wound on drums."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from eomgen.base.errors import SceneError
+from eomgen.language.base import Identifier, Table
+from eomgen.language.formula import ZERO, Apply, Constant, Formula
+from eomgen.language.quantity import Quantity, Vector, quantity, with_components
+from eomgen.language.rewriting import difference
+from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row, Ways
+from eomgen.scene.constraints.spans import Stop, section_of, spans_of, way_of
+from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.joints.base import WORLD
+
+MOST_STOPS = 100
+Sense = Literal["clockwise", "counterclockwise"]
+
+
+class RopePoint(Table):
+    """What a rope is held by or runs through: a point or a ring, or with `radius` a disc about it,
+    which it goes round in the sense `winds`, seen along the rope from its first end to its last.
+
+    The rope slides through rings and over discs without friction. A disc that `grips` takes it
+    along without slip; so does a disc at an end, a drum, on which it is wound.
+    """
+
+    example: ClassVar[str] = """
+[[constraints]]
+type = "rope"
+name = "hoist"
+
+[[constraints.through]]
+body = "hand"
+
+[[constraints.through]]
+body = "world"
+at = [0.4, 1.0]
+radius = 0.1
+winds = "clockwise"
+
+[[constraints.through]]
+body = "world"
+at = [0.9, -0.5]
+"""
+
+    body: Identifier = Field(description="body it is fixed to, or 'world'")
+    at: Vector = quantity(
+        "m", "the point, from the centre of mass", default=(), validate_default=False
+    )
+    radius: Quantity | None = quantity("m", "radius of the disc", "positive", default=None)
+    winds: Sense | None = Field(default=None, description="sense in which the rope goes round it")
+    grips: bool = Field(
+        default=False, strict=True, description="whether the disc takes the rope without slip"
+    )
+
+    @model_validator(mode="after")
+    def _keys_fit(self) -> Self:
+        if self.radius is None and self.winds is not None:
+            raise wrong("winds", "is that of a disc; give its radius, or leave it out")
+        if self.radius is None and self.grips:
+            raise wrong("grips", "is that of a disc; give its radius, or leave it out")
+        if self.radius is not None and self.winds is None:
+            raise wrong("winds", "is missing; say how the rope goes round: clockwise or not")
+        return self
+
+
+class Taut(ConstraintTable):
+    """What is taut along its way: its rows. The lengths that a scene does not give are those of the
+    start, and the angles at drums count from there.
+    """
+
+    length: Quantity | None = quantity(
+        "m", "length; if absent, that of the start", "positive", default=None
+    )
+
+    _angles: Mapping[str, Formula] = PrivateAttr(default_factory=dict)
+    """The angle of each body that has a disc which takes the rope along, rad."""
+    _lengths: tuple[Formula, ...] = PrivateAttr(default=())
+    """The length of each section, m."""
+    _directions: tuple[tuple[float, ...], ...] = PrivateAttr(default=())
+    """The direction of each span at the start."""
+
+    def stops(self) -> tuple[Stop, ...]:
+        """What it runs over, in order."""
+        raise NotImplementedError
+
+    @property
+    def internal(self) -> bool:
+        """True if it is not held by the world."""
+        return all(stop.body != WORLD for stop in self.stops())
+
+    def placed(self, ways: Ways, location: str) -> Self:
+        """With the angles of its drums."""
+        drums = [stop for stop in self.stops() if stop.grips]
+        copy = self.replaced()
+        copy._angles = {s.body: ways.turn(s.body, WORLD, location) for s in drums}
+        return copy
+
+    def begun(self, mechanism: Linkage) -> Self:
+        """With the lengths and directions of the start."""
+        if self._lengths:
+            return self
+        copy, stops = self.replaced(), self.stops()
+        spans = spans_of(mechanism, stops)
+        copy._directions = tuple(tuple(map(float, span.direction)) for span in spans)
+        copy._lengths = (ZERO,) * len(self._sections())
+        copy._lengths = tuple(Constant(-float(row.residual)) for row in copy.rows(mechanism))  # type: ignore[arg-type]
+        if self.length is not None:
+            whole = Constant(float(way_of(mechanism, stops, spans)))
+            *_, last = copy._lengths
+            last = (
+                self.length if whole == last else Apply("+", (self.length, difference(last, whole)))
+            )
+            copy._lengths = (*copy._lengths[:-1], last)
+        return copy
+
+    def _sections(self) -> list[tuple[int, int]]:
+        """The first and the last stop of each section: what takes the rope along divides it."""
+        count = len(self.stops())
+        cuts = [i for i, stop in enumerate(self.stops()) if stop.grips and 0 < i < count - 1]
+        return list(zip((0, *cuts), (*cuts, count - 1), strict=True))
+
+    def row_names(self, dimensions: int) -> list[tuple[str, str]]:
+        """A row for each section, whose multiplier is its tension."""
+        count = len(self._sections())
+        if count == 1:
+            return [(self.name, "N")]
+        return [(f"{self.name}_{i + 1}", "N") for i in range(count)]
+
+    def rows(self, mechanism: Linkage) -> Iterator[Row]:
+        """The length of each section less what it takes on its way."""
+        stops = self.stops()
+        spans = spans_of(mechanism, stops)
+        angles = {body: mechanism.value(angle) for body, angle in self._angles.items()}
+        lengths = self._lengths or (ZERO,) * len(self._sections())
+        for length, (first, last) in zip(lengths, self._sections(), strict=True):
+            part = slice(first, last)
+            taken, loads = section_of(
+                mechanism,
+                stops[first : last + 1],
+                spans[part],
+                angles,
+                self._directions[part] or ((1.0, 0.0),) * (last - first),
+            )
+            yield Row(mechanism.value(length) - taken, loads)
+
+
+class Rope(Taut):
+    """A massless rope of fixed `length` that is taut along its way `through` points, rings and
+    discs: see `points of ropes`. Its spans are straight, and discs are left along tangents, in the
+    plane. A load on a rope through a ring, a block and tackle, a string that winds on a drum.
+
+    The length is that of the spans and of the arcs on discs between the ends; if it is absent, it
+    is that of the start, and so it is for a rope that ends on a drum. The rope is to touch each
+    disc that it goes round, and to leave one that takes it along in a direction within half a turn
+    from that at the start.
+
+    The multiplier is the tension, N. It stays taut even if that becomes negative, as a rod would;
+    with `tension_only` a `spring` is slack then. Where a disc takes it along, each section has
+    a tension of its own: rows `<name>_1`, `<name>_2`, ….
+    """
+
+    told = "A rope of fixed length is taut along its way. λ is its tension."
+    example: ClassVar[str] = """
+[[constraints]]
+type = "rope"
+name = "hoist"
+through = [
+    { body = "hand" },
+    { body = "world", at = [0.4, 1.0] },
+    { body = "world", at = [0.9, -0.5] },
+]
+"""
+    anchor_fields = ("through",)
+
+    type: Literal["rope"]
+    through: Annotated[tuple[RopePoint, ...], Field(min_length=2, max_length=MOST_STOPS)] = Field(
+        description="what it is held by and runs through, from end to end"
+    )
+
+    def checked(self, dimensions: int, location: str) -> Self:
+        """Check points, and that discs are in the plane; an end on a disc is on a drum."""
+        through = []
+        for i, point in enumerate(self.through):
+            at = with_components(point.at, ZERO, dimensions, f"{location}.through[{i}].at")
+            if point.radius is not None and dimensions == 3:
+                raise SceneError(
+                    f"{location}.through[{i}].radius: a rope goes round discs in the plane only; "
+                    "in space leave it out: the rope runs through a ring"
+                )
+            drum = point.radius is not None and i in (0, len(self.through) - 1)
+            if drum and self.length is not None:
+                raise SceneError(
+                    f"{location}.length: a rope that ends on a drum, through[{i}], has the length "
+                    "of the start; leave it out"
+                )
+            through.append(point.replaced(at=at, grips=point.grips or drum))
+        return self.replaced(through=tuple(through))
+
+    def from_centres(self, centres: Mapping[str, tuple[Formula, ...]]) -> Mapping[str, Any]:
+        """Its points from the centres of mass."""
+        return {
+            "through": tuple(
+                point.replaced(
+                    at=tuple(
+                        difference(r, c) for r, c in zip(point.at, centres[point.body], strict=True)
+                    )
+                )
+                if point.body in centres
+                else point
+                for point in self.through
+            )
+        }
+
+    def stops(self) -> tuple[Stop, ...]:
+        """Its points."""
+        return tuple(
+            Stop(p.body, p.at, p.radius, p.winds != "clockwise", p.grips) for p in self.through
+        )

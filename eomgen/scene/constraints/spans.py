@@ -1,0 +1,135 @@
+"""Straight spans of ropes between points and discs, and what ropes take of discs that turn.
+
+A disc that a rope goes round counterclockwise has its centre on the left of the rope. With the
+signed radius ρ, positive in this sense, the unit vector u along the rope and n to the left of it,
+the tangent point is c - ρ n. From one disc to the next d = c' - c = L u + h n with h = ρ' - ρ, so
+the span is L = sqrt(d·d - h²).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from eomgen.language.formula import Formula
+from eomgen.scalars import exact
+from eomgen.scene.constraints.base import Linkage
+from eomgen.scene.effects.base import Load, Scalar, Vector
+from eomgen.scene.effects.vectors import dot, negative, sub
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A point that a rope meets, from the centre of mass in body axes, or a disc about it.
+
+    left   whether the disc is on the left of the rope, which goes round it counterclockwise
+    grips  whether the disc takes the rope along
+    """
+
+    body: str
+    at: tuple[Formula, ...]
+    radius: Formula | None = None
+    left: bool = True
+    grips: bool = False
+
+
+@dataclass(frozen=True)
+class Span:
+    """A straight part: its length, m, and its unit direction, world axes."""
+
+    length: Scalar
+    direction: Vector
+
+
+def spans_of(mechanism: Linkage, stops: Sequence[Stop]) -> list[Span]:
+    """The spans between stops."""
+    centres = [mechanism.position(stop.body, _at(mechanism, stop)) for stop in stops]
+    radii = [_signed(mechanism, stop) for stop in stops]
+    found = []
+    for k in range(len(stops) - 1):
+        d = mechanism.called("d", *sub(centres[k + 1], centres[k]))
+        found.append(_span(mechanism, d, radii[k], radii[k + 1]))
+    return found
+
+
+def _at(mechanism: Linkage, stop: Stop) -> Vector:
+    return tuple(map(mechanism.value, stop.at))
+
+
+def _signed(mechanism: Linkage, stop: Stop) -> Scalar | None:
+    """ρ of a disc; None for a point."""
+    if stop.radius is None:
+        return None
+    radius = mechanism.value(stop.radius)
+    return radius if stop.left else -radius
+
+
+def _span(mechanism: Linkage, d: Vector, start: Scalar | None, end: Scalar | None) -> Span:
+    """The tangent of two discs; points are discs without a radius."""
+    square = dot(d, d)
+    if start is None and end is None:
+        (length,) = mechanism.called("s", mechanism.call("sqrt", square))
+        return Span(length, mechanism.called("u", *(x / length for x in d)))
+    nothing = mechanism.zero
+    h = (nothing if end is None else end) - (nothing if start is None else start)
+    (length,) = mechanism.called("s", mechanism.call("sqrt", square - h * h))
+    x, y = d
+    along = ((length * x + h * y) / square, (length * y - h * x) / square)
+    return Span(length, mechanism.called("u", *along))
+
+
+def _angle(mechanism: Linkage, one: Vector, other: Vector) -> Scalar:
+    """The angle from one direction to another, in (-π, π], rad."""
+    return mechanism.call("atan2", one[0] * other[1] - one[1] * other[0], dot(one, other))
+
+
+def _arc(mechanism: Linkage, stop: Stop, before: Span, after: Span) -> Scalar:
+    """The arc on a disc between two spans, less than a turn, m."""
+    u, w = before.direction, after.direction
+    one, other = (u, w) if stop.left else (w, u)
+    half = mechanism.number(exact.quarter_turns(2, 0.0))
+    assert stop.radius is not None
+    turn = half + mechanism.call("atan2", one[1] * other[0] - one[0] * other[1], -dot(one, other))
+    return mechanism.value(stop.radius) * turn
+
+
+def way_of(mechanism: Linkage, stops: Sequence[Stop], spans: Sequence[Span]) -> Scalar:
+    """The length of spans and of the arcs on the discs between them, m."""
+    total = spans[0].length
+    for stop, before, after in zip(stops[1:-1], spans, spans[1:], strict=False):
+        if stop.radius is not None:
+            total = total + _arc(mechanism, stop, before, after)
+        total = total + after.length
+    return total
+
+
+def section_of(
+    mechanism: Linkage,
+    stops: Sequence[Stop],
+    spans: Sequence[Span],
+    angles: Mapping[str, Scalar],
+    directions: Sequence[tuple[float, ...]],
+) -> tuple[Scalar, tuple[Load, ...]]:
+    """The length that a section takes, whose first and last stop may take the rope along, m; and
+    the loads of a tension of 1.
+
+    A disc at angle θ from which the rope leaves in a direction at φ from that of the start has let
+    go ρ (θ - φ) of it since then.
+    """
+    total = way_of(mechanism, stops, spans)
+    torques: list[Vector] = [(), ()]
+    for k, (stop, span) in enumerate(((stops[0], spans[0]), (stops[-1], spans[-1]))):
+        radius = _signed(mechanism, stop)
+        if not stop.grips or radius is None:
+            continue
+        along = tuple(map(mechanism.number, directions[-k]))
+        turned = _angle(mechanism, along, span.direction) - angles[stop.body]
+        total = total - radius * turned if k else total + radius * turned
+        torques[k] = (-radius,) if k else (radius,)
+    loads = []
+    for k, span in enumerate(spans):
+        ends = zip(
+            (stops[k], stops[k + 1]), (span.direction, negative(span.direction)), strict=True
+        )
+        for n, (stop, pull) in enumerate(ends):
+            torque = torques[n] if k == (len(spans) - 1) * n else ()
+            loads.append(Load(stop.body, pull, _at(mechanism, stop), "applied", torque))
+    return total, tuple(loads)
