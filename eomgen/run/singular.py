@@ -22,6 +22,7 @@ REGULAR = 1e-4
 """A margin of the rank where margins are 0 that shows that the mechanism is not singular, but what
 was taken as independent."""
 ELSEWHERE = "take another start, or lengths that do not line up"
+FLAT = "as where a disc lies flat or a rope leaves its disc"
 OTHERS = "take other coordinates: loops = 'projected' in the scene, and --route aba"
 """Remedies."""
 
@@ -45,15 +46,15 @@ class SingularPositionError(StepFailure):
                 f"coordinates do not follow from it by constraint {held.names[least]}"
             )
             if isinstance(held, Projection):
-                reason += ", or this has no direction, as where a disc lies flat"
+                reason += f", or this has no direction, {FLAT}"
                 remedy = f"{ELSEWHERE}, or {OTHERS}"
         else:
             dead = isinstance(held, SolvedLoops)
             remedy = OTHERS if dead else ELSEWHERE
             reason = (
                 f"the mechanism is singular at t = {t:.6g} s: constraint {held.names[least]} "
-                "follows from the others there, as at a change point, or has no direction, as "
-                "where a disc lies flat"
+                "follows from the others there, as at a change point, or has no direction, "
+                f"{FLAT}"
             )
         super().__init__(reason, remedy)
         self.dead = dead

@@ -208,6 +208,20 @@ def test_rates_of_a_rope_are_those_of_its_length() -> None:
     assert max(abs(module.constraint_residuals(0.0, y)).max() for y in run.y[::100]) < 1e-9
 
 
+def test_a_run_ends_where_a_rope_leaves_its_disc() -> None:
+    """Without a word it would go on with an arc of a turn more."""
+    text = scene(
+        '[[bodies]]\nname = "bob"\nmass = 1.0\n[[joints]]\nname = "fly"\ntype = "particle"\n'
+        'parent = "world"\nchild = "bob"\n',
+        weight("b", 1.0, -0.2),
+        rope('body = "b"', disc("world", "[0, 0]", 0.2), 'body = "bob"'),
+        start="[initial]\nq = { bob_x = 0.2, bob_y = -1.0, y_b = -1.0 }\nv = { bob_x_dot = 6 }\n",
+    )
+    module = load_module(generate(model_of(text), jacobian=False).module, "hoist")
+    run = integrate(as_problem(module), "DOP853", 3.0)
+    assert not run.finished and "rope leaves its disc" in run.message
+
+
 def test_gears_and_belts() -> None:
     """A train's reduced inertia; Willis's ratio of a planetary gear, whose ring is the world."""
     train = [

@@ -103,7 +103,7 @@ def _begun(model: Model) -> Model:
         except (ArithmeticError, ValueError):
             raise SceneError(
                 f"initial.q: constraint '{constraint.name}' has no direction at this start, as "
-                "where a disc lies flat, or a rope has no way; give another"
+                "where a disc lies flat, or a rope has no way; give another, or initial.guess"
             ) from None
         found.append(constraint)
     return replace(model, constraints=tuple(found))

@@ -135,6 +135,11 @@ class ConstraintEquations:
         held = np.array([[row.residual is not None] for row in rows], dtype=bool)
         return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
 
+    def margin(self, q: Array) -> float:
+        """The least margin of the rows: 0 where one of them has no direction."""
+        found = [row.margin for row in self.dynamics(q).rows if row.margin is not None]
+        return float(min(found, default=1.0))
+
     def moved(self, q: Array, step: Array) -> Array:
         """q after a step (nv,) of the velocities' directions, in sizes; quaternions stay unit."""
         rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())

@@ -89,6 +89,7 @@ def _walk(equations: ConstraintEquations, walk: int) -> Iterator[Place]:
     q = np.array(model.initial_q)
     _, matrix = equations.both(q)
     least = min(REGULAR, _regularity(matrix) / 2)
+    has_margins = any(row.margin is not None for row in equations.dynamics(q).rows)
     for _ in range(max(SHORTEST, min(LONGEST, ALL // nv))):
         step = heading - np.linalg.lstsq(matrix, matrix @ heading, rcond=1e-9)[0]
         size = float(np.abs(step).max())
@@ -105,6 +106,8 @@ def _walk(equations: ConstraintEquations, walk: int) -> Iterator[Place]:
         else:
             return
         if not equations.upright(q) or _regularity(matrix) < least:
+            return
+        if has_margins and equations.margin(q) < REGULAR**2:
             return
         heading = step / size
         yield q, matrix

@@ -24,9 +24,9 @@ class Belt(Transmission):
 [[constraints]]
 type = "belt"
 name = "drive"
-body_1 = "forearm"
-body_2 = "arm"
-carrier = "world"
+body_1 = "hand"
+body_2 = "world"
+carrier = "arm"
 radius_1 = 0.05
 radius_2 = 0.2
 """

@@ -123,9 +123,9 @@ class Gear(Transmission):
 [[constraints]]
 type = "gear"
 name = "mesh"
-body_1 = "forearm"
-body_2 = "arm"
-carrier = "world"
+body_1 = "hand"
+body_2 = "world"
+carrier = "arm"
 teeth_1 = 12
 teeth_2 = 36
 """

@@ -11,7 +11,7 @@ from eomgen.language.formula import ZERO, Apply, Constant, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity, with_components
 from eomgen.language.rewriting import difference
 from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row, Ways
-from eomgen.scene.constraints.spans import Stop, section_of, spans_of, way_of
+from eomgen.scene.constraints.spans import Stop, margin_of, section_of, spans_of, way_of
 from eomgen.scene.effects.bodies import wrong
 from eomgen.scene.joints.base import WORLD
 
@@ -136,6 +136,8 @@ class Taut(ConstraintTable):
         spans = spans_of(mechanism, stops)
         angles = {body: mechanism.value(angle) for body, angle in self._angles.items()}
         lengths = self._lengths or (ZERO,) * len(self._sections())
+        directions = self._directions or ((1.0, 0.0),) * len(spans)
+        margin = margin_of(mechanism, stops, spans, directions)
         for length, (first, last) in zip(lengths, self._sections(), strict=True):
             part = slice(first, last)
             taken, loads = section_of(
@@ -143,9 +145,9 @@ class Taut(ConstraintTable):
                 stops[first : last + 1],
                 spans[part],
                 angles,
-                self._directions[part] or ((1.0, 0.0),) * (last - first),
+                directions[part],
             )
-            yield Row(mechanism.value(length) - taken, loads)
+            yield Row(mechanism.value(length) - taken, loads, margin=margin)
 
 
 class Rope(Taut):

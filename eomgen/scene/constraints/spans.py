@@ -33,10 +33,13 @@ class Stop:
 
 @dataclass(frozen=True)
 class Span:
-    """A straight part: its length, m, and its unit direction, world axes."""
+    """A straight part: its length, m, its unit direction, world axes, and the square of its length
+    relative to the distance of the discs' centres; None between points.
+    """
 
     length: Scalar
     direction: Vector
+    share: Scalar | None = None
 
 
 def spans_of(mechanism: Linkage, stops: Sequence[Stop]) -> list[Span]:
@@ -70,10 +73,11 @@ def _span(mechanism: Linkage, d: Vector, start: Scalar | None, end: Scalar | Non
         return Span(length, mechanism.called("u", *(x / length for x in d)))
     nothing = mechanism.zero
     h = (nothing if end is None else end) - (nothing if start is None else start)
-    (length,) = mechanism.called("s", mechanism.call("sqrt", square - h * h))
+    left = square - h * h
+    (length,) = mechanism.called("s", mechanism.call("sqrt", left))
     x, y = d
     along = ((length * x + h * y) / square, (length * y - h * x) / square)
-    return Span(length, mechanism.called("u", *along))
+    return Span(length, mechanism.called("u", *along), left / square)
 
 
 def _angle(mechanism: Linkage, one: Vector, other: Vector) -> Scalar:
@@ -99,6 +103,31 @@ def way_of(mechanism: Linkage, stops: Sequence[Stop], spans: Sequence[Span]) -> 
             total = total + _arc(mechanism, stop, before, after)
         total = total + after.length
     return total
+
+
+def margin_of(
+    mechanism: Linkage,
+    stops: Sequence[Stop],
+    spans: Sequence[Span],
+    directions: Sequence[tuple[float, ...]],
+) -> Scalar | None:
+    """How far the way is from its end, at most 1: the product of what becomes 0 where a span has no
+    length, where the rope leaves a disc or has gone round it once, and where it leaves one that
+    takes it along against the direction of the start. None between points.
+    """
+    half, one = mechanism.number(0.5), mechanism.number(1.0)
+    parts = [span.share for span in spans if span.share is not None]
+    for stop, before, after in zip(stops[1:-1], spans, spans[1:], strict=False):
+        if stop.radius is not None:
+            parts.append(half * (one - dot(before.direction, after.direction)))
+    for k, span in enumerate(spans):
+        if any(stop.grips for stop in stops[k : k + 2]):
+            along = tuple(map(mechanism.number, directions[k]))
+            parts.append(half * (one + dot(along, span.direction)))
+    margin: Scalar | None = None
+    for part in parts:
+        margin = part if margin is None else margin * part
+    return margin
 
 
 def section_of(
