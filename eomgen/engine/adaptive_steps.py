@@ -1,10 +1,22 @@
 """Many steps whose lengths follow from a tolerance, one after another, by any method."""
 
 from dataclasses import dataclass
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
+
+import numpy as np
 
 from eomgen.engine.adaptive import AGAIN, AT_END, EVENT, MADE, UNUSUAL, Bounds, Progress
-from eomgen.subset.words import Matrix, Vector, Whole, copy, inf, next_after, ordered, zeros
+from eomgen.subset.words import (
+    Matrix,
+    Vector,
+    Whole,
+    copy,
+    inf,
+    next_after,
+    ordered,
+    with_arrays,
+    zeros,
+)
 
 
 @dataclass(slots=True)
@@ -140,7 +152,7 @@ def adaptive_steps(
             return UNUSUAL
         last = copy(raw)
         wrong = ordered(raw * 0.0)
-        if wrong != 0.0 or not checks.is_usual() or not checks.placed(at.end, last):
+        if not checks.is_usual() or wrong != 0.0 or not checks.placed(at.end, last):
             return UNUSUAL
         why = checks.seen(at, y, raw, last)
         if why != MADE and why != EVENT:
@@ -189,6 +201,25 @@ def step_on(
     return why
 
 
+def _has_rows(
+    by: Stepping, checks: Checks, at: Progress, y: Vector, raw: Vector, kept: Records
+) -> bool:
+    """As `has_rows`."""
+    first = kept.passed
+    last = first + int(np.searchsorted(kept.times[first : kept.count], at.end))
+    if last == first:
+        return True
+    times: Any = kept.times[first:last]
+    places = np.empty((last - first, len(y)))
+    by.between(at, y, raw, times[:, None], places)
+    if not np.isfinite(places).all():
+        return False
+    kept.passed = last
+    kept.rows[first:last] = places
+    return all(map(checks.placed, times.tolist(), kept.rows[first:last]))
+
+
+@with_arrays(_has_rows)
 def has_rows(
     by: Stepping,
     checks: Checks,

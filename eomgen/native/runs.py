@@ -7,6 +7,7 @@ from typing import Any
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.adaptive import within
 from eomgen.engine.embedded import DOP853
 from eomgen.native import contact_runs, equal_steps, strides
 from eomgen.native.functions import restricted
@@ -14,7 +15,6 @@ from eomgen.native.mechanism import Mechanism
 from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Stretch, Stride, WholeRun
-from eomgen.run.integrators.dormand_prince_8 import interpolated
 
 MAIN = "runs.c"
 
@@ -49,7 +49,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
 
 
 def _method(call: Any, *memory: str) -> strides.Method:
-    return strides.Method(call, memory or ("h_abs", "f", "lost"), (), 7, interpolated)
+    return strides.Method(call, memory or ("h_abs", "f", "lost"), (), 7, within)
 
 
 def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:

@@ -18,28 +18,20 @@ from eomgen.engine.methods import Root
 from eomgen.native import contact_runs
 from eomgen.native.mechanism import Mechanism, made_margins
 from eomgen.run import branches
-from eomgen.run.compiled import Array, Stretch, Stride, Watched, WholeRun
+from eomgen.run.compiled import MEMORY, Array, Stretch, Stride, Watched, WholeRun
 from eomgen.subset.structures import address, filled, take, with_room
 
 ROOTS: list[Root] = [
     (name, {}) for name in ("adaptive_steps", "passed_over", "end_at", "normalised")
 ]
 """What steps call of the engine, beside the method."""
-MEMORY = {
-    "h_abs": "lengths",
-    "f": "slopes",
-    "lost": "losses",
-    "h_last": "last_lengths",
-    "error": "errors",
-}
-"""The records of what determines a solver's next step."""
 SOME = ("slopes", "errors", "jacobians", "factorisations", "terms")
 """The records that only some steps need."""
 _NONE = np.empty(0)
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
-Between = Callable[[float, float, Array, Array, float], Array]
-"""The state at a time in a step from `start` of length h from a state, by its terms."""
+Between = Callable[[Progress, Array, Array, float, Array], None]
+"""The state at a time in a step from a state, by its terms, as `engine.adaptive.within`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,5 +219,6 @@ def _within(
 ) -> Array:
     """The state at a time in step number i of those that begin at a time and a state."""
     start, first = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else begun
-    terms = kept.terms[kept.wide * i : kept.wide * (i + 1)]
-    return between(start, float(kept.last_lengths[i]), first, terms, time)
+    terms, place = kept.terms[kept.wide * i : kept.wide * (i + 1)], np.empty(len(first))
+    between(Progress(start, float(kept.last_lengths[i])), first, terms, time, place)
+    return place

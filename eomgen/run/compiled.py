@@ -18,6 +18,14 @@ from eomgen.subset.structures import copied
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
+MEMORY = {
+    "h_abs": "lengths",
+    "f": "slopes",
+    "lost": "losses",
+    "h_last": "last_lengths",
+    "error": "errors",
+}
+"""The engine's records of what determines a method's next step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +80,7 @@ class Stride:
     counts: Mapping[str, NDArray[np.int64]]
     sampled: NDArray[np.int64]
     rows: Array
-    usual: bool
+    usual: bool = True
     event: bool = False
     switched: Array = field(default_factory=partial(np.empty, 0))
     values: Array = field(default_factory=partial(np.empty, 0))

@@ -162,6 +162,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
         *(method, bounds, asked.t_end, times, remark, compiled.steps if compiled else None),
         each=bool(asked.tally or asked.powers),
         dense=asked.powers is not None,
+        alone=bool(asked.guard or asked.tally or asked.powers),
     )
 
     def rows(a: float, b: float) -> list[float]:

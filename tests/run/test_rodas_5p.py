@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from single_steps import made
 
 from eomgen.engine import rodas_5p_coefficients as own
 from eomgen.engine import rosenbrock
@@ -156,7 +157,7 @@ def test_a_fast_mode_vanishes() -> None:
         atol=1e3,
     )  # fmt: skip
     solver.h_abs = 1.0
-    solver.step()
+    made(solver)
     assert solver.t == 1.0 and abs(solver.y[0]) < 1e-7
 
 
@@ -178,7 +179,7 @@ def test_the_order_is_five() -> None:
         )  # fmt: skip
         for _ in range(count):
             solver.h_abs = solver.bounds.longest = 4.0 / count
-            solver.step()
+            made(solver)
         errors.append(float(np.abs(solver.y - (math.cos(4), -math.sin(4))).max()))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (np.abs(orders - 5) < 0.4).all(), (errors, orders)

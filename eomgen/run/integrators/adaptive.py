@@ -50,15 +50,13 @@ def advances(
     method, bounds = settings.method, settings.bounds
     stepper = Stepper(settings, problem, touched)
     stepper.begin(t_start, resume)
-    compiled = None
-    if settings.steps and method.compiled:
-        compiled = Strides(stepper, settings.steps)
+    strides = Strides(stepper)
     left, here = bounds.most - made, 0
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         most = min(m for m in (left, CHECK_STIFFNESS, _CHECK_PACE) if m > here) - here
         most = min(most, stepper.shaken.left) if stepper.shaken else most
-        portion = (compiled.made(most) if compiled else None) or stepper.made()
+        portion = strides.made(most)
         if portion is None:  # the step must be repeated
             here += 1
             continue

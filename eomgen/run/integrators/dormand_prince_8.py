@@ -4,6 +4,7 @@ Its steps are those of `eomgen.engine.adaptive`, which also C and the page make:
 bits on every machine on which its derivative has them.
 """
 
+import copy
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -11,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.engine.adaptive import Progress, interpolate, made, within
+from eomgen.engine.adaptive import Bounds, Progress, interpolate, made, within
+from eomgen.engine.adaptive_steps import Records
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.sums import round_off
 from eomgen.run.integrators.interface import Adaptive
-from eomgen.run.integrators.solver import Solver, States
-from eomgen.run.problem import FloatArray
+from eomgen.run.integrators.maker import Maker
+from eomgen.subset.words import Vector
 
 FEW = 12
 """Greatest number of states for which Python's own numbers are quicker than NumPy."""
@@ -26,7 +28,7 @@ _made: Counter[int] = Counter()
 """Steps made so far, by the number of states."""
 
 
-class DormandPrince8(Solver):
+class DormandPrince8(Maker):
     """Its state has the length `h_abs` of the next step in s, and the slope `f` at t, y."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
@@ -36,24 +38,45 @@ class DormandPrince8(Solver):
         self._k: Any = np.zeros((len(DOP853.nodes), many))
         if many <= FEW:
             self._k = list(self._k)
-        self._at, self._start = Progress(), self.y
+        self._terms = np.empty((7, many))
         self._made = self._how()
-        self._dense: States | None = None
 
-    def made(self) -> tuple[float, FloatArray] | None:
-        """See `Solver`."""
-        y, k, at = self.y, self._k, self._at
-        change = np.empty(y.shape)
-        k[0], at.t, at.length, self.bounds.until = self.f, self.t, self.h_abs, self.t_bound
+    def begin(self) -> None:
+        """See `Maker`, also for what follows."""
+        self._k[DOP853.last] = self.f
         if self._is_new:
             self._made = self._how()
-        if not self._made(self, self.bounds, at, y, self.lost, k, change):
-            return None
-        self.h_abs, self._start, self._dense, raw = at.length, y, None, y + change
-        k[DOP853.last] = self.f = self.derivative(at.end, raw)
-        self.lost = np.empty(y.shape)
-        round_off(y, raw, change, self.lost)
-        return at.end, raw
+
+    def make(self, run: Bounds, at: Progress, y: Vector, lost: Vector, raw: Vector) -> bool:
+        k, change = self._k, np.empty(y.shape)
+        k[0] = self._slope(at.t, y)
+        if not self._made(self, run, at, y, lost, k, change):
+            return False
+        raw[:] = y + change
+        k[DOP853.last] = self.derivative(at.end, raw)
+        round_off(y, raw, change, lost)
+        return True
+
+    def _slope(self, t: float, y: Vector) -> Vector:
+        """That where a step begins."""
+        slope: Vector = self._k[DOP853.last]
+        return slope
+
+    def between(self, at: Progress, y: Vector, raw: Vector, t: Any, place: Vector) -> None:
+        interpolate(DOP853, self, at, y, raw, self._k, self._terms)
+        within(at, y, self._terms, t, place)
+
+    def record(self, run: Bounds, at: Progress, y: Vector, raw: Vector, kept: Records) -> None:
+        kept.slopes[kept.made] = self._k[DOP853.last]
+
+    def frozen(self) -> "DormandPrince8":
+        made = copy.copy(self)
+        made._k, made._terms = self._k.copy(), self._terms.copy()
+        return made
+
+    @property
+    def slopes(self) -> Vector | None:
+        return np.array([self._k[0], self._k[DOP853.last]])
 
     def _how(self) -> Callable[..., bool]:
         """The function that makes a step: for few states it is printed once it pays off."""
@@ -66,27 +89,6 @@ class DormandPrince8(Solver):
         from eomgen.engine.printed import steps_of_few
 
         return steps_of_few(ny)
-
-    def dense_output(self) -> States:
-        """See `Solver`."""
-        if self._dense is None:
-            at, y = self._at, self._start
-            terms = np.empty((7, len(y)))
-            interpolate(DOP853, self, at, y, self.y, self._k, terms)
-            self._dense = partial(interpolated, at.t, at.h, y, terms)
-        return self._dense
-
-
-def interpolated(
-    start: float, h: float, y: FloatArray, terms: FloatArray, times: FloatArray | float
-) -> FloatArray:
-    """The states at times within a step of length h from `y` at `start`, from the terms (7, ny) of
-    its interpolant.
-    """
-    place = np.empty((*np.shape(times), len(y)))
-    each: Any = np.asarray(times)[..., None]
-    within(Progress(start, h), y, terms, each, place)
-    return place.T
 
 
 INTEGRATOR = Adaptive(

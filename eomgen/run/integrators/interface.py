@@ -69,7 +69,7 @@ class FixedStep:
 class Adaptive:
     """A method that chooses its steps to meet rtol and atol.
 
-    solver         SciPy's `OdeSolver` of the method, or a class with the same interface
+    maker          makes its `Maker`
     uses_jacobian  whether it is given the problem's Jacobian
     asks_more      whether it takes `timed`, which says whether the derivative depends on time, and
                    `positions`, the number of states that are positions and come first
@@ -78,13 +78,13 @@ class Adaptive:
     remedy         what to change when a run fails
     smallest_rtol  the smallest relative tolerance that it takes
     compiled       name of its compiled steps, "" if there are none
-    memory         attributes of the solver, numbers or arrays, that together with time and state
+    memory         attributes of its maker, numbers or arrays, that together with time and state
                    determine the next step; the first is its length. Empty if these do not suffice
     vectors        those of `memory` that have a number for each state
     series         name of the Taylor series that it is given; "" if it needs none
     """
 
-    solver: Callable[..., Any]
+    maker: Callable[..., Any]
     uses_jacobian: bool = False
     asks_more: bool = False
     one_step: bool = True

@@ -36,7 +36,6 @@ class Portion(NamedTuple):
               these are not known
     met       called before the last step is given, which is the part of one up to an event of rigid
               contacts; None if there is none
-    totals    what a single step has counted, in the order of `COUNTED`, in place of `counts`
     """
 
     problem: Problem
@@ -50,14 +49,10 @@ class Portion(NamedTuple):
     resume: Callable[[int], Resume] | None
     margins: FloatArray | None = None
     met: Callable[[], None] | None = None
-    totals: Sequence[int] = ()
 
     def advances(self, each: bool) -> Iterator[Advance]:
         """The steps as one `Advance`, or as one for each; the part of one is apart."""
         m = len(self.ends)
-        if self.totals:
-            yield self._last(self._advance(0, self.rows, 1, self.totals))
-            return
         marks = range(m) if each else range(max(0, m - 1 - (self.met is not None)), m)
         sums = (self.sampled, *(self.counts.get(name) for name in COUNTED))
         row, before = 0, -1

@@ -2,21 +2,27 @@
 `eomgen.engine.rosenbrock`.
 """
 
-from functools import partial
+import copy
+from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from eomgen.engine import few
-from eomgen.engine.adaptive import Bounds
-from eomgen.engine.rosenbrock import STAGES, Rodas, Solutions, rodas_step
-from eomgen.run.integrators.interface import Adaptive, Remark, ignored
-from eomgen.run.integrators.solver import Solver, States
-from eomgen.run.problem import FloatArray
+from eomgen.engine.adaptive import Bounds, Progress
+from eomgen.engine.adaptive_steps import Records
+from eomgen.engine.rosenbrock import (
+    STAGES,
+    Rodas,
+    Solutions,
+    rodas_within,
+    rosenbrock_step,
+)
+from eomgen.run.integrators.interface import Adaptive
+from eomgen.run.integrators.maker import Maker
 from eomgen.subset.structures import with_room
+from eomgen.subset.words import Vector
 
 
-class Rodas5P(Solver):
+class Rodas5P(Maker):
     """Its state has `h_abs`, `h_last` and `error` of `Rodas`.
 
     jac        the Jacobian df/dy, (t, y) -> (ny, ny)
@@ -24,7 +30,7 @@ class Rodas5P(Solver):
     positions  the number of states that are positions, which come first
     """
 
-    remark: Remark = staticmethod(ignored)
+    counts = ("factorisations",)
 
     def __init__(
         self, *given: Any, jac: Any, timed: bool = True, positions: int = 0, **options: Any
@@ -36,40 +42,39 @@ class Rodas5P(Solver):
         self._run = rodas(len(y), self.bounds, positions, timed)
         self._run.solutions = Solutions(len(y))  # type: ignore[assignment]
         self._factors = few.factors_of(len(y), positions)
-        self._step = (0.0, y)
 
-    def made(self) -> tuple[float, FloatArray] | None:
-        """See `Solver`."""
-        run, t, y = self._run, self.t, self.y
-        run.h_abs, run.h_last, run.error = self.h_abs, self.h_last, self.error
-        run.longest, run.t_bound, run.factorisations = self.bounds.longest, self.t_bound, self.nlu
-        run.lost, run.last = self.lost.copy(), np.empty_like(y)
-        is_made = rodas_step(self, run, self._factors, t, y)
-        self.nlu = run.factorisations
-        if not is_made:
-            return None
-        self.h_abs, self.h_last, self.error = run.h_abs, run.h_last, run.error
-        self.lost, self._step = run.lost, (run.end - t, y)
-        return run.end, run.last
+    def begin(self) -> None:
+        """See `Maker`, also for what follows."""
+        run = self._run
+        run.h_last, run.error, run.factorisations = self.h_last, self.error, 0
 
-    def dense_output(self) -> States:
-        """See `Solver`."""
-        (h, y), last = self._step, self.y.copy()
-        terms = np.vstack((self._run.dense, last))
-        return partial(between, self.t_old, h, y, terms)
+    def make(self, run: Bounds, at: Progress, y: Vector, lost: Vector, raw: Vector) -> bool:
+        self._run.lost = lost
+        made = rosenbrock_step(self, self._run, self._factors, run, at, y, raw)
+        self.factorisations = self._run.factorisations
+        return made
+
+    def between(self, at: Progress, y: Vector, raw: Vector, t: Any, place: Vector) -> None:
+        rodas_within(self._run, y, (t - at.t) / at.h, place)
+
+    def record(self, run: Bounds, at: Progress, y: Vector, raw: Vector, kept: Records) -> None:
+        kept.errors[kept.made] = self._run.error
+        kept.factorisations[kept.made] = self.factorisations
+
+    def frozen(self) -> "Rodas5P":
+        made = copy.copy(self)
+        made._run = copy.copy(self._run)
+        made._run.dense, made._run.last = self._run.dense.copy(), self._run.last.copy()
+        return made
 
 
-def between(
-    start: float, h: float, y: FloatArray, terms: FloatArray, times: FloatArray | float
-) -> FloatArray:
-    """The states at times within a step of length h from `y` at `start`, from the terms (4, ny) of
-    its interpolant, of which the last is the state at its end.
+def between(at: Progress, y: Vector, terms: Any, t: Any, place: Vector) -> None:
+    """The state at a time within a step from y, from the terms (4, ny) of its interpolant, of which
+    the last is the state at its end.
     """
-    first, second, third, last = terms
-    x = (np.asarray(times)[..., None] - start) / h
-    back = 1 - x
-    bend = back * (first + x * (second + x * third))
-    return np.asarray(back * y + x * (last + bend)).T
+    *dense, last = terms
+    known: Any = SimpleNamespace(dense=dense, last=last)
+    rodas_within(known, y, (t - at.t) / at.h, place)
 
 
 def rodas(n: int, bounds: Bounds, positions: int, timed: bool) -> Rodas:

@@ -1,4 +1,4 @@
-"""Steps of an adaptive method that compiled code makes, many at once."""
+"""Steps of an adaptive method, many at once, in compiled code or in Python."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,6 +8,7 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor
 from eomgen.run.compiled import Array, Steps, Stretch, Stride, Watched
+from eomgen.run.integrators.in_python import AHEAD, InPython
 from eomgen.run.integrators.interface import Resume
 from eomgen.run.integrators.portions import Portion, Size
 from eomgen.run.integrators.stepper import Stepper, continuation
@@ -20,21 +21,17 @@ OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates", "held", 
 
 
 class Strides:
-    """The compiled steps of a run, for its stepper; `steps` is asked for them each time."""
+    """Makes the steps of a run, in compiled code if there is some."""
 
-    def __init__(
-        self,
-        stepper: Stepper,
-        steps: Callable[[str, tuple[str, ...]], Steps | None],
-    ) -> None:
-        problem = stepper.problem
+    def __init__(self, stepper: Stepper) -> None:
+        problem, settings = stepper.problem, stepper.settings
         switching, contacts, self._looked = (
             problem.switching,
             problem.contacts,
             problem.solved_loops,
         )
-        self._stepper, self._steps = stepper, steps
-        self._dense = stepper.settings.dense or self._looked is not None
+        self._stepper, self._steps = stepper, settings.steps if stepper.method.compiled else None
+        self._dense = settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
@@ -42,16 +39,34 @@ class Strides:
             *(PROJECTS if problem.projection else ()),
         )
         self._usual, self._size = True, Size()
+        self._own, looks = InPython(stepper), (contacts, problem.projection, self._looked)
+        self._alone = settings.alone or any(map(bool, (*looks, stepper.branches)))
+        self._ahead = 1
 
     def made(self, most: int) -> Portion | None:
-        """Make at most `most` steps and put the solver at their end; None if Python must make the
-        next one, or if there are no compiled ones yet.
+        """Make at most `most` steps and put the solver at their end; None if the next one must be
+        made again.
         """
+        name = self._stepper.method.compiled
+        steps = self._steps(name, self._needed) if self._steps else None
+        portion = self._compiled(steps, most) if steps else None
+        return portion or self._in_python(1 if steps or self._alone else min(most, self._ahead))
+
+    def _in_python(self, most: int) -> Portion | None:
+        """The same in Python. An event may end the steps, and those beyond it are in vain."""
+        branches, stride = self._stepper.branches, self._own.made(most)
+        if stride is None:
+            return None
+        self._ahead = min(2 * self._ahead, AHEAD)
+        memory = branches.memory if branches else {}
+        return self._portion(stride, None, lambda _: memory)
+
+    def _compiled(self, steps: Steps, most: int) -> Portion | None:
+        """The same in compiled code; None if Python must make the next one."""
         stepper, solver, branches = self._stepper, self._stepper.solver, self._stepper.branches
-        steps = self._steps(stepper.method.compiled, self._needed)
         usual, self._usual = self._usual, True
         features = branches and branches.features
-        if steps is None or not usual or (features and not hasattr(solver, "f")):
+        if not usual or (features and not hasattr(solver, "f")):
             return None
         most, watched = min(most, self._size.most), None
         if branches:
@@ -80,38 +95,42 @@ class Strides:
         self._usual = stride.usual
         if met and touched:
             met.now.slack[:] = touched.slack
-        portion = self._portion(stride, watched, margins)
+        if branches and watched:
+            if watched.ends:
+                branches.passed(stride.ends, stride.values, stride.switched)
+            branches.restore(_checks(watched, stride, len(stride.ends) - 1))
+        checked = partial(_checks, watched, stride) if watched else _unchecked
+        portion = self._portion(stride, margins, checked)
         if stride.event and met and touched:
             return portion._replace(met=partial(met.take, touched))
         return portion
 
-    def _portion(self, stride: Stride, watched: Watched | None, margins: Array | None) -> Portion:
-        """These steps, at whose end the solver is put."""
-        stepper, solver, branches = self._stepper, self._stepper.solver, self._stepper.branches
+    def _portion(
+        self, stride: Stride, margins: Array | None, checked: Callable[[int], dict[str, Any]]
+    ) -> Portion:
+        """These steps, at whose end the solver is put; `checked` gives what `BranchMonitor.memory`
+        is after one of them.
+        """
+        stepper, solver = self._stepper, self._stepper.solver
         ends, until, is_whole = stride.ends, stepper.until, stepper.is_whole
         start, whole = solver.t, len(ends)
-        if until == stepper.t_end and stepper.method.series:  # which tries no step twice
+        if is_whole and until == stepper.t_end and stepper.method.series:  # tries no step twice
             whole -= int(ends[-1] == until)
-        elif until == stepper.t_end:
+        elif is_whole and until == stepper.t_end:
             starts = np.concatenate(([start], ends[:-1]))
             lengths = np.concatenate(([solver.h_abs], stride.memory["h_abs"][:-1]))
             free = starts + np.minimum(lengths, stepper.longest) < until
             whole = whole if free.all() else int(np.argmin(free))
         if whole < len(ends):  # those from there on are shortened by the end
-            stepper.shorten()
+            stepper.shorten(until)
         solver.t_old, solver.t = float(ends[-2]) if len(ends) > 1 else start, float(ends[-1])
         for name, values in stride.memory.items():
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
-        if branches and watched:
-            if watched.ends:
-                branches.passed(ends, stride.values, stride.switched)
-            branches.restore(_checks(watched, stride, len(ends) - 1))
-        if not ends[-1] < until:
-            solver.status = "finished"
+        solver.reached = not ends[-1] < until
         within = partial(_within, stepper.problem, stride.within) if stride.within else _unknown
         cut = until if until != stepper.t_end else np.inf
-        resume = partial(_after, stride, watched, cut, whole - 1) if is_whole and whole else None
+        resume = partial(_after, stride, checked, cut, whole - 1) if is_whole and whole else None
         rows = Rows(stepper.times[stepper.sampled :][: stride.sampled[-1]], stride.rows)
         before, factorisations = stepper.counted()
         counts = {**stride.counts, "capped": stepper.capped(start, ends)}
@@ -120,7 +139,8 @@ class Strides:
             counts["factorisations"] = factorisations + stride.counts["factorisations"]
         stepper.sampled += int(stride.sampled[-1])
         of = ends, stride.states, rows, stride.sampled, counts
-        return Portion(stepper.problem, start, *of, within, resume, margins)
+        met = _nothing if stride.event else None
+        return Portion(stepper.problem, start, *of, within, resume, margins, met)
 
 
 def _are_tame(branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
@@ -130,15 +150,27 @@ def _are_tame(branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
     return branches.tame(t, y, np.concatenate((solver.f[None], stride.memory["f"])))
 
 
-def _after(stride: Stride, watched: Watched | None, cut: float, last: int, i: int) -> Resume:
+def _nothing() -> None:
+    """What is to be known of an event in a step of Python is known."""
+
+
+def _unchecked(i: int) -> dict[str, Any]:
+    """There are no branches."""
+    return {}
+
+
+def _after(
+    stride: Stride, checked: Callable[[int], dict[str, Any]], cut: float, last: int, i: int
+) -> Resume:
     """What a later run needs to continue after step i, or after the `last`, if the steps up to
     there do not depend on the end of the run. Steps that are cut off end at `cut`.
     """
     i = min(i, last)
     memory: dict[str, Any] = {name: values[i] for name, values in stride.memory.items()}
     end = float(stride.ends[i])
-    if watched:
-        memory |= {"until": cut if end < cut else np.inf, **_checks(watched, stride, i)}
+    checks = checked(i)
+    if checks:
+        memory |= {"until": cut if end < cut else np.inf, **checks}
     return continuation(end, stride.states[i], memory)
 
 
