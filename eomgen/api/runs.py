@@ -187,7 +187,8 @@ class Run(Simulated):
         """A figure for a paper, as Matplotlib's `Figure`.
 
         of        quantities against time: states, "energy", outputs and their components, as
-                  "joint_forces.hinge.fx"; names, or a text of names with commas, here and below
+                  "joint_forces.hinge.fx", effects, as "coil", "coil.force", "coil.power"; names,
+                  or a text of names with commas, here and below
         phase     two quantities, one against the other
         poincare  two quantities where the motion passes `at`, one against the other; or one, each
                   value against the one before

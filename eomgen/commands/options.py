@@ -72,8 +72,8 @@ class Plot(Picture):
 
     of: str = option(
         "",
-        "states, energy, outputs as joint_forces, components as joint_forces.NAME.fx, against "
-        "time (all coordinates)",
+        "states, energy, effects as NAME, NAME.force or NAME.power, outputs as joint_forces, "
+        "components as joint_forces.NAME.fx, against time (all coordinates)",
         value="A,B,…",
     )
     phase: str = option("", "B against A", value="A,B")

@@ -10,8 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from eomgen.show.motion import Motion, instants, thinned
-from eomgen.show.panels import MOST_CURVES, draw_curves, draw_map, draw_small, widen
+from eomgen.show.motion import Array, Motion, instants, thinned
+from eomgen.show.panels import (
+    BENEATH,
+    EPSILON,
+    MOST_CURVES,
+    draw_curves,
+    draw_map,
+    draw_small,
+    widen,
+)
 from eomgen.show.plane import draw_plane
 from eomgen.show.space import draw_space
 from eomgen.show.style import (
@@ -62,19 +70,26 @@ def _draw_few(motion: Motion, groups: Mapping[str, list[int]]) -> Figure:
     """Mechanism and balance of energy on the left, all else on the right."""
     figure = Figure(figsize=(12.0, 7.4))
     _draw_heading(figure, motion)
-    rows = len(groups) + 1 + (motion.works is not None)
-    heights = [3.2 / rows] * rows + [1.0]
-    grid = figure.add_gridspec(rows + 1, 2, width_ratios=(1.25, 1), height_ratios=heights)
-    balanced = _is_balanced(motion)
-    _draw_mechanism(figure.add_subplot(grid[: -1 if balanced else None, 0]), motion)
-    for row, (title, indices) in enumerate(groups.items()):
-        _draw_coordinates(figure.add_subplot(grid[row, 1]), motion, title, indices)
-    _draw_energy(figure.add_subplot(grid[len(groups), 1]), motion)
+    right: list[Callable[[Axes, Motion], None]] = [
+        partial(_draw_coordinates, title=title, indices=indices)
+        for title, indices in groups.items()
+    ]
+    right.append(_draw_energy)
     if motion.works is not None:
-        _draw_works(figure.add_subplot(grid[-2, 1]), motion)
+        right.append(_draw_works)
+    heights = [3.2 / len(right)] * len(right) + [1.0]
+    balanced, apart = _is_balanced(motion), _comes_apart(motion)
+    if apart:
+        right.append(_draw_drift)
+    grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.25, 1), height_ratios=heights)
+    _draw_mechanism(figure.add_subplot(grid[: -1 if balanced else None, 0]), motion)
+    column = grid[:, 1].subgridspec(len(right), 1, height_ratios=heights[: len(right)])
+    for row, draw in enumerate(right):
+        axes = figure.add_subplot(column[row])
+        draw(axes, motion)
+        _label_times(axes, row == len(right) - 1)
     if balanced:
         _draw_balance(figure.add_subplot(grid[-1, 0]), motion)
-    _draw_drift(figure.add_subplot(grid[-1, 1]), motion)
     return figure
 
 
@@ -87,11 +102,13 @@ def _draw_many(motion: Motion, groups: Mapping[str, list[int]]) -> Figure:
     high = min(sum(heights) + BETWEEN * len(heights), HIGHEST)
     figure = Figure(figsize=(12.0, max(7.4, high + 0.9)))
     _draw_heading(figure, motion)
-    below: list[Callable[[Axes, Motion], None]] = [_draw_energy, _draw_drift]
+    below: list[Callable[[Axes, Motion], None]] = [_draw_energy]
     if motion.works is not None:
-        below.insert(1, _draw_works)
+        below.append(_draw_works)
     if _is_balanced(motion):
-        below.insert(-1, _draw_balance)
+        below.append(_draw_balance)
+    if _comes_apart(motion):
+        below.append(_draw_drift)
     sides = figure.add_gridspec(1, 2, width_ratios=(1, 1.05))
     left = sides[0].subgridspec(1 + len(below), 1)
     right = sides[1].subgridspec(len(groups), 1, height_ratios=heights)
@@ -124,8 +141,26 @@ def _label_times(axes: Axes, last: bool) -> None:
 
 
 def _is_balanced(motion: Motion) -> bool:
-    """Whether the error of energy is known."""
-    return motion.keeps_energy or motion.works is not None
+    """Whether the error of energy is known, and is not 0 throughout."""
+    return (motion.keeps_energy or motion.works is not None) and bool(_imbalance(motion).any())
+
+
+def _imbalance(motion: Motion) -> Array:
+    """The error of energy against the size of the motion's energies, (n,)."""
+    kinetic, potential = motion.kinetic_energy, motion.potential_energy
+    off = kinetic + potential
+    if not motion.keeps_energy:
+        assert motion.works is not None
+        off = kinetic - motion.works.sum(axis=1)
+    # The zero of potential energy is arbitrary, so it must not affect the scale.
+    scale = float(kinetic.max() + np.ptp(potential)) or 1.0
+    return np.abs(off - off[:1]) / scale
+
+
+def _comes_apart(motion: Motion) -> bool:
+    """Whether joints have gaps that are more than rounding; by their coordinates they have none."""
+    size = float(np.ptp(motion.places, axis=(0, 1)).max(initial=0.0))
+    return bool((motion.joint_drift > 10 * EPSILON * size).any())
 
 
 def save_figure(motion: Motion, path: Path, force: bool = False) -> None:
@@ -196,9 +231,9 @@ def _draw_coordinates(
 def _draw_energy(axes: Axes, motion: Motion) -> None:
     kinetic, potential = motion.kinetic_energy, motion.potential_energy
     values = np.column_stack([kinetic, potential, kinetic + potential])
-    draw_curves(
-        axes, motion.t, values, ["kinetic", "potential", "total"], [KINETIC, POTENTIAL, TOTAL]
-    )
+    names, colour = ["kinetic", "potential", "total"], [KINETIC, POTENTIAL, TOTAL]
+    draw_curves(axes, motion.t, values, names, colour)
+    axes.lines[-1].set(**BENEATH)
     widen(axes, values)
     axes.set_title("Energy")
     axes.set_ylabel("J")
@@ -215,15 +250,10 @@ def _draw_works(axes: Axes, motion: Motion) -> None:
 
 
 def _draw_balance(axes: Axes, motion: Motion) -> None:
-    kinetic, potential = motion.kinetic_energy, motion.potential_energy
-    if motion.keeps_energy:
-        title, off = r"Relative change of energy,  $|E-E_0|", kinetic + potential
-    else:
-        assert motion.works is not None
-        title, off = r"Energy unaccounted for,  $|T-T_0-W|", kinetic - motion.works.sum(axis=1)
-    # The zero of potential energy is arbitrary, so it must not affect the scale.
-    scale = float(kinetic.max() + np.ptp(potential)) or 1.0
-    draw_small(axes, motion.t, np.abs(off - off[:1])[:, None] / scale, [""], [TOTAL])
+    title = r"Relative change of energy,  $|E-E_0|"
+    if not motion.keeps_energy:
+        title = r"Energy unaccounted for,  $|T-T_0-W|"
+    draw_small(axes, motion.t, _imbalance(motion)[:, None], [""], [TOTAL])
     axes.set_title(title + r"\,/\,(\max\,T + \mathrm{range}\,V)$")
 
 

@@ -15,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from eomgen.base.errors import RunError
 from eomgen.show.motion import Array, Motion
-from eomgen.show.panels import MOST_CURVES, draw_map, widen
+from eomgen.show.panels import BENEATH, MOST_CURVES, draw_map, widen
 from eomgen.show.plane import draw_plane
 from eomgen.show.space import draw_space
 from eomgen.show.style import INK, PALETTE, plain, style, symbol
@@ -117,6 +117,7 @@ def _draw_panel(axes: Axes, t: Array, group: Sequence[Quantity], width: float) -
             marker="o" if len(t) == 1 else "",
             color=_colour(quantity, k if len(group) > 1 else None),
             label=_named(quantity),
+            **(BENEATH if quantity.name == "energy.total" else {}),
         )
     axes.margins(x=0)
     axes.set_ylabel(_beside(group, unit))

@@ -6,10 +6,15 @@ joint_forces           an output: all its components
 joint_forces.hinge     those of one joint, body, point or effect
 joint_forces.hinge.fx  one component; x is short for the first that ends in x
 works, inputs          what the run keeps of them
+coil                   an effect: its forces and its power
+coil.force             its forces and moments on bodies about their centres of mass, in world axes,
+                       and on coordinates
+coil.force.arm.fx      one component, as that of a joint
+coil.power             its power on the motion
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,11 +23,14 @@ from eomgen.base.errors import RunError, nearest
 from eomgen.model.model import Model
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.effects import Effect
+from eomgen.study.effect_loads import components_of
 from eomgen.study.observed import Observed
 from eomgen.study.recording import FOLLOWING, all_of, held_rows, labels_of, unknown_where
 from eomgen.study.whole import following
 from eomgen.tables.outputs import GROUPS, OUTPUTS, SAVED, WORDS
 
+POWERS = "effect_powers"
 MOST = 200
 """Greatest number of quantities in one figure."""
 
@@ -60,10 +68,13 @@ def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> t
             continue
         if head in WORDS and WORDS[head].unit + WORDS[head].title:  # the run or every module has it
             continue
+        if head not in (*GROUPS, *SAVED) and head in (effects := effects_in(trajectory)):
+            found += [POWERS]
+            continue
         if head not in (*GROUPS, *SAVED):
-            near = (*trajectory.states, *WORDS, *SAVED)
+            near = (*trajectory.states, *effects, *WORDS, *SAVED)
             hint = nearest(head, near) or f"; states: {', '.join(trajectory.states[:12])}"
-            raise RunError(f"{argument}: no state or output '{head}'{hint}")
+            raise RunError(f"{argument}: no state, effect or output '{head}'{hint}")
         found += GROUPS.get(head, (head,))
     return tuple(found)
 
@@ -72,6 +83,12 @@ def following_in(trajectory: Trajectory) -> tuple[str, ...]:
     """The names of coordinates and velocities that follow from the states of a run."""
     saved = trajectory.saved.get(FOLLOWING)
     return saved.columns if saved else ()
+
+
+def effects_in(trajectory: Trajectory) -> tuple[str, ...]:
+    """The names of the effects of a run's scene."""
+    tables: Any = trajectory.setup.tables() if trajectory.setup else {}
+    return tuple(table.get("name", table["type"]) for table in tables.get("effects", ()))
 
 
 def quantities(
@@ -115,9 +132,53 @@ def _found(
         yield from _energies(name, parts, run, t, y, argument)
     elif head in ("works", "inputs"):
         yield from _kept(head, parts, run, t, argument)
-    else:
+    elif head in (*GROUPS, *SAVED):
         for output in GROUPS.get(head, (head,)):
             yield from _of_output(output, parts, run, t, y, argument)
+    else:
+        yield from _of_effect(name, run, t, y, argument)
+
+
+def _of_effect(
+    name: str, run: Observed, t: FloatArray, y: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    head, *parts = name.split(".")
+    what = parts[0] if parts else ""
+    if what not in ("", "force", "power"):
+        raise RunError(f"{argument}: {name}: of an effect take {head}.force or {head}.power")
+    if what != "power":
+        effect = next(effect for effect in run.model.effects if effect.name == head)
+        yield from _forces_of(effect, parts[1:], run, t, y, argument)
+    if what != "force":
+        if parts[1:]:
+            raise RunError(f"{argument}: {name}: a power has no components; take {head}.power")
+        (power,) = _of_output(POWERS, [head], run, t, y, argument)
+        yield replace(power, name=f"{head}.power")
+
+
+def _forces_of(
+    effect: Effect, parts: list[str], run: Observed, t: FloatArray, y: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    found = components_of(effect, run, t, y, argument)
+    chosen = [each for each in found if _is_chosen(each[0], parts)]
+    if not chosen:
+        known = ", ".join(".".join(names) for names, *_ in found)
+        raise RunError(
+            f"{argument}: {effect.name}.force has no '{'.'.join(parts)}'; known: {known}"
+        )
+    sizes: dict[str, float] = {}
+    for _, unit, values in found:
+        sizes[unit] = max(sizes.get(unit, 0.0), np.nan_to_num(np.abs(values)).max(initial=0.0))
+    for names, unit, values in chosen:
+        label, what = ".".join(names), "force" if unit == "N" else "moment"
+        title = f"{effect.name.replace('_', ' ')} {what}"
+        yield Quantity(f"{effect.name}.force.{label}", label, title, unit, values, sizes[unit])
+
+
+def _is_chosen(names: Sequence[str], parts: Sequence[str]) -> bool:
+    """Whether the parts of a name stand in these, in order."""
+    left = iter(names)
+    return all(any(_match(part, [name]) for name in left) for part in parts)
 
 
 def _energies(

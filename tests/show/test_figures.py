@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from effect_cases import BASES
 from matplotlib.text import Text
 from PIL import Image
 from test_show import swinging
@@ -26,6 +27,7 @@ from eomgen.show.film import film_times, frame_rate
 from eomgen.show.style import write_figure
 from eomgen.study.between import between, crossings
 from eomgen.study.observed import observed
+from eomgen.study.quantities import quantities
 from eomgen.study.sections import section
 
 OSCILLATOR = """
@@ -93,11 +95,13 @@ def test_curves_are_the_run(cart: tuple[eomgen.Run, eomgen.Run]) -> None:
 @pytest.mark.parametrize(
     ("of", "said"),
     [
-        ({"of": "thet"}, r"of: no state or output 'thet' \(did you mean 'theta'\?\)"),
+        ({"of": "thet"}, r"of: no state, effect or output 'thet' \(did you mean 'theta'\?\)"),
         ({"of": "joint_force"}, r"did you mean 'joint_forces'"),
         ({"of": "joint_forces.pim"}, r"has no component 'pim' \(did you mean 'pin'\?\)"),
         ({"of": "works"}, "simulate with --works"),
         ({"of": "theta.x"}, "a state has no components"),
+        ({"of": "push.foo"}, "of an effect take push.force or push.power"),
+        ({"of": "push.force.y"}, "push.force has no 'y'; known: x"),
         ({"phase": ["theta"]}, "give two names"),
         ({"phase": ["theta", "energy"]}, "each must be one quantity"),
         ({"poincare": ["theta"]}, "needs both"),
@@ -216,6 +220,80 @@ def test_pdf_is_whole_and_reproducible(cart: tuple[eomgen.Run, eomgen.Run], tmp_
         assert made[0][offset:].startswith(b"%d 0 obj" % number)
     box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", made[0])
     np.testing.assert_allclose([float(x) for x in box.groups()], np.array([120, 80]) * 72 / 25.4)
+
+
+ACTED = """
+[[effects]]
+type = "spring"
+name = "coil"
+body_1 = "a"
+body_2 = "c"
+at_1 = {at}
+stiffness = 30.0
+damping = 1.0
+[[effects]]
+type = "drag"
+name = "air"
+bodies = ["b", "c"]
+linear = 0.3
+turning_linear = 0.2
+[[effects]]
+type = "joint_spring"
+name = "hold"
+joint = "hinge"
+stiffness = 5.0
+[[effects]]
+type = "motor"
+name = "push"
+joint = "rail"
+torque = "2*sin(t)"
+[initial]
+v = {{ q_dot = 1.0 }}
+"""
+
+
+@pytest.mark.parametrize(("base", "at"), [("plane", [0.2, 0.4]), ("space", [0.2, 0.4, -0.3])])
+def test_forces_of_effects_do_their_work(base: str, at: list[float]) -> None:
+    """Those on bodies, at the velocities of these, and those on coordinates have the power that
+    the module gives; that on one coordinate is its law.
+    """
+    scene = BASES[base].format(outputs="") + ACTED.format(at=at)
+    run = eomgen.simulate(scene, t_end=1.0, samples=21, rtol=1e-6)
+    seen = observed(run.trajectory, ("body_velocities", "effect_powers"))
+    t, y = run.t, run.y
+    velocities = seen.output("body_velocities", t, y)
+    bodies = [body.name for body in run.model.bodies]
+    names = ("vx", "vy", "wz") if base == "plane" else ("vx", "vy", "vz", "wx", "wy", "wz")
+    for k, effect in enumerate(run.model.effects):
+        power = np.zeros(len(t))
+        for quantity in quantities([f"{effect.name}.force"], seen, t, y):
+            first, _, part = quantity.label.partition(".")
+            if part:
+                kind = part.replace("f", "v").replace("m", "w")
+                rate = velocities[:, bodies.index(first), names.index(kind)]
+            else:
+                rate = y[:, run.states.index(f"{first}_dot")]
+            power += quantity.values * rate
+        np.testing.assert_allclose(power, seen.output("effect_powers", t, y)[:, k], atol=1e-12)
+        *_, last = quantities([effect.name], seen, t, y)
+        np.testing.assert_allclose(last.values, power, atol=1e-12)
+    (torque,) = curves(run, "hold.force.q")
+    np.testing.assert_allclose(torque, -5.0 * y[:, run.states.index("q")], rtol=1e-12)
+
+
+def test_what_equals_the_total_is_seen_and_no_panel_is_empty() -> None:
+    """A wheel has kinetic energy alone, which lies on the total; its joint has no gap."""
+    wheel = OSCILLATOR.replace('"k", damping = "c"', "0, damping = 0").replace(
+        "initial = { q = { x = 1.0 } }", "initial = { v = { x_dot = 1.0 } }"
+    )
+    run = eomgen.simulate(wheel, t_end=1.0, samples=11)
+    for figure in (run.plot("energy"), run.figure()):
+        for axes in figure.axes:
+            assert axes.get_lines() or axes.patches, axes.get_title(loc="left")
+        (axes,) = (a for a in figure.axes if len(a.get_lines()) == 3 and a.get_legend())
+        kinetic, _, total = axes.get_lines()
+        np.testing.assert_array_equal(kinetic.get_ydata(), total.get_ydata())
+        assert total.zorder < kinetic.zorder and total.get_lw() > kinetic.get_lw()
 
 
 def test_letters_of_a_paper_can_be_read(cart: tuple[eomgen.Run, eomgen.Run]) -> None:
@@ -339,7 +417,10 @@ def test_the_commands(
     for line, said in (
         ("plot out/pendulum.npz --t-end 3", "are for a scene"),
         ("plot out/pendulum.npz --times 1", "are for --strobe"),
-        ("plot out/pendulum.npz --of energi", "--of: no state or output 'energi' (did you mean"),
+        (
+            "plot out/pendulum.npz --of energi",
+            "--of: no state, effect or output 'energi' (did",
+        ),
         ("plot out/pendulum.npz --strobe --count 0", "--strobe: give 1 to 50 poses"),
         ("plot out/none.npz", "out/none.npz: cannot be read"),
         ("plot pendulum -o a.jpg", "a figure is written as .png, .svg or .pdf"),
