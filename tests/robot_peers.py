@@ -75,13 +75,37 @@ class Robot:
 
     def difference(self, rng: np.random.Generator) -> Apart:
         """The differences at a random state, with random forces of motors."""
-        names = [name for name in self.pin.names if name in self.joints]
-        held = [name for name in names if self.own[name] in self.locked]
-        free = [n for n in names if n not in held and self._mimic(n) is None]
-        rows = {name: self._dependence(name, free) for name in names}
-        x, rate, torque = rng.normal(size=(3, len(free)))
+        q, v, basis = self.sample(rng)
+        names = [name for name in self.joints if self.pin.existJointName(name)]
+        free = self._free()
+        torque, load = rng.normal(size=len(free)), np.zeros(self.pin.nv)
+        for name in names:
+            i = self.pin.joints[self.pin.getJointId(name)].idx_v
+            load[i] = self._friction(name, v[i])
+            if name in free:
+                load[i] += torque[free.index(name)]
+        mass = pin.crba(self.pin, self.data, q)
+        mass = np.triu(mass) + np.triu(mass, 1).T
+        h = pin.nonLinearEffects(self.pin, self.data, q, v)
+        scaled = basis / np.sqrt(np.diag(basis.T @ mass @ basis))
+        whole = scaled.T @ mass @ scaled
+        expected = scaled @ np.linalg.solve(whole, scaled.T @ (load - h))
 
-        q, v, load = pin.neutral(self.pin), np.zeros(self.pin.nv), np.zeros(self.pin.nv)
+        y = self.to.state(q, v)
+        u = {f"{self.own[n]}_motor": float(x) for n, x in zip(free, torque, strict=True)}
+        off = np.abs(self.to.acceleration(0.0, y, u) - expected).max() / np.abs(expected).max()
+        back = [*(self.to.position(y) - q), *(self.to.velocity(y) - v)]
+        condition = float(np.linalg.cond(whole))
+        return Apart(float(off), self._frames(q, v, y), float(np.abs(back).max()), condition)
+
+    def sample(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+        """A random q and v of Pinocchio that the joints which mimic others keep, and a basis of the
+        velocities that do.
+        """
+        names, free = [n for n in self.pin.names if n in self.joints], self._free()
+        rows = {name: self._dependence(name, free) for name in names}
+        x, rate = rng.normal(size=(2, len(free)))
+        q, v = pin.neutral(self.pin), np.zeros(self.pin.nv)
         columns = [np.zeros((self.pin.nv, len(free)))]
         for joint in self.pin.joints:
             if joint.nv in (3, 6):  # a planar or a free one
@@ -98,23 +122,13 @@ class Robot:
                 [angle] if joint.nq == 1 else [np.cos(angle), np.sin(angle)]
             )
             v[i], columns[0][i] = float(row @ rate), row
-            load[i] = self._friction(name, v[i])
-            if name in free:
-                load[i] += torque[free.index(name)]
-        basis = np.hstack(columns)
-        mass = pin.crba(self.pin, self.data, q)
-        mass = np.triu(mass) + np.triu(mass, 1).T
-        h = pin.nonLinearEffects(self.pin, self.data, q, v)
-        scaled = basis / np.sqrt(np.diag(basis.T @ mass @ basis))
-        whole = scaled.T @ mass @ scaled
-        expected = scaled @ np.linalg.solve(whole, scaled.T @ (load - h))
+        return q, v, np.hstack(columns)
 
-        y = self.to.state(q, v)
-        u = {f"{self.own[n]}_motor": float(x) for n, x in zip(free, torque, strict=True)}
-        off = np.abs(self.to.acceleration(0.0, y, u) - expected).max() / np.abs(expected).max()
-        back = [*(self.to.position(y) - q), *(self.to.velocity(y) - v)]
-        condition = float(np.linalg.cond(whole))
-        return Apart(float(off), self._frames(q, v, y), float(np.abs(back).max()), condition)
+    def _free(self) -> list[str]:
+        """The joints that move and mimic no other."""
+        names = [name for name in self.pin.names if name in self.joints]
+        held = [name for name in names if self.own[name] in self.locked]
+        return [n for n in names if n not in held and self._mimic(n) is None]
 
     def _frames(self, q: Array, v: Array, y: Array) -> float:
         """The difference of places and velocities of links."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import LARGEST_JACOBIAN, OutputNodes, names_of_inputs
 from eomgen.dynamics.tree.composite import Entries, solved
-from eomgen.dynamics.tree.sensitivity import sensitivity
+from eomgen.dynamics.tree.sensitivity import Sensitivity, sensitivity
 from eomgen.dynamics.tree.vectors import sub, zeros
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.tape import Node, Stage
@@ -118,16 +118,94 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     return [*above, *middle, *jacobian(d.state_rates, by)]
 
 
+def inverse_derivatives(
+    record: Recording, vd: Sequence[Node]
+) -> tuple[list[list[Node]], list[list[Node]]]:
+    """The columns of the derivatives of inverse dynamics at accelerations `vd`, less the effects':
+    by a small motion along each velocity, which of a spherical joint is a small rotation in body
+    axes, and by the velocities.
+    """
+    slopes, nv = _slopes(record, vd), range(len(record.v))
+    by_position, by_velocity = _applied_slopes(record)
+    zero = record.tape.constant(0.0)
+
+    def less(entries: Entries, applied: list[list[Node]]) -> list[list[Node]]:
+        return [[entries.get((i, j), zero) - applied[j][i] for i in nv] for j in nv]
+
+    return less(slopes.by_position, by_position), less(slopes.by_velocity, by_velocity)
+
+
+def forward_derivatives(
+    record: Recording, tau: Sequence[Node]
+) -> tuple[list[list[Node]], list[list[Node]], list[list[Node]]]:
+    """The columns of the derivatives of accelerations under generalised forces `tau` beside the
+    effects: by position and velocity as in `inverse_derivatives`, and by `tau`.
+    """
+    found, tape = record.forward(tau), record.tape
+    if _differentiated(record):
+        by = [*record.q, *record.v, *tau]
+        columns = list(zip(*jacobian(found, by), strict=True))
+        nq, nv = len(record.q), len(record.v)
+        along = _along_velocities(record, columns[:nq])
+        return along, [list(c) for c in columns[nq:][:nv]], [list(c) for c in columns[nq + nv :]]
+    zero, one = tape.constant(0.0), tape.constant(1.0)
+    rows, factors = range(len(record.v)), record.dynamics.factors
+    by_position, by_velocity = (
+        [solved(factors, [zero - x for x in column]) for column in columns]
+        for columns in inverse_derivatives(record, found)
+    )
+    units = ([one if i == j else zero for i in rows] for j in rows)
+    return by_position, by_velocity, [solved(factors, unit) for unit in units]
+
+
+def _applied_slopes(record: Recording) -> tuple[list[list[Node]], list[list[Node]]]:
+    """The columns of the derivatives of applied forces, as in `inverse_derivatives`."""
+    rows = jacobian(record.dynamics.applied_force, [*record.q, *record.v])
+    columns = [list(column) for column in zip(*rows, strict=True)]
+    nq = len(record.q)
+    return _along_velocities(record, columns[:nq]), columns[nq:]
+
+
+def _along_velocities(record: Recording, columns: Sequence[Sequence[Node]]) -> list[list[Node]]:
+    """Derivatives by small motions along the velocities, from those by the coordinates: a rotation
+    δ in body axes is dq = ½ q (0, δ) for a quaternion q.
+    """
+    nv, half = len(record.v), record.tape.constant(0.5)
+    found: list[list[Node]] = [[] for _ in range(nv)]
+    for index in record.model.joint_indices:
+        for i, j in index.plain:
+            if j < nv:
+                found[j] = list(columns[i])
+        if not index.quaternion:
+            continue
+        w, x, y, z = (half * record.q[i] for i in index.quaternion)
+        parts = [columns[i] for i in index.quaternion]
+        for j, weights in zip(
+            index.spin, ((-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w)), strict=True
+        ):
+            found[j] = [
+                sum((k * part for k, part in zip(weights, row, strict=True)), half - half)
+                for row in zip(*parts, strict=True)
+            ]
+    return found
+
+
+def _slopes(record: Recording, vd: Sequence[Node]) -> Sensitivity:
+    """Derivatives of inverse dynamics without effects at accelerations."""
+    d = record.dynamics
+    base = sub(zeros(record.scalars), d.down)
+    twists, accelerating = d.motion_in_world(vd)
+    return sensitivity(d.inertias_in_world, twists, accelerating, base, record.scalars)
+
+
 def _state_columns(record: Recording) -> list[list[Node]]:
     """The columns of ∂τ/∂y at fixed accelerations, for a state y = [q, v, x].
 
     `sensitivity` differentiates by a small rotation δ in body axes; for a quaternion q the chain
     rule takes δ = (2/|q|²) Im(q* dq).
     """
-    d, model, tape = record.dynamics, record.model, record.tape
-    base = sub(zeros(record.scalars), d.down)
-    twists, accelerating = d.motion_in_world(record.vd)
-    slopes = sensitivity(d.inertias_in_world, twists, accelerating, base, record.scalars)
+    model, tape = record.model, record.tape
+    slopes = _slopes(record, record.vd)
     nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
 
     def column(entries: Entries, j: int) -> list[Node]:

@@ -11,6 +11,7 @@ from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.tree import observables
 from eomgen.dynamics.tree.composite import full
 from eomgen.dynamics.tree.loads import generalised
+from eomgen.dynamics.tree.motion import Twist
 from eomgen.dynamics.tree.vectors import Vec, in_space, zeros
 from eomgen.program import differentiate
 from eomgen.program.tape import Node
@@ -149,17 +150,17 @@ def body_velocities(record: Recording) -> list[Node]:
 
 def point_positions(record: Recording) -> list[Node]:
     """World position of each named point, m."""
-    return _points(record, _point_position)
+    return of_points(record, _point_position)
 
 
 def point_velocities(record: Recording) -> list[Node]:
     """World velocity of each named point, m/s."""
-    return _points(record, _point_velocity)
+    return of_points(record, _point_velocity)
 
 
 def point_jacobians(record: Recording) -> list[Node]:
     """Jacobian of the velocity of each named point."""
-    return _points(record, _point_jacobian)
+    return of_points(record, _point_jacobian)
 
 
 def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
@@ -167,7 +168,7 @@ def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
     return observables.velocity(d.linkage, d.kinematics, d.twists, body, at, record.scalars)
 
 
-def _points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node]]) -> list[Node]:
+def of_points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node]]) -> list[Node]:
     """The results of `of` for all named points; it takes a body and a position in body axes."""
     nodes: list[Node] = []
     for point in record.model.points:
@@ -185,8 +186,13 @@ def _point_velocity(record: Recording, body: int, at: Vec) -> Sequence[Node]:
 
 
 def _point_jacobian(record: Recording, body: int, at: Vec) -> Sequence[Node]:
+    columns = frame_jacobian(record, body, at)
+    return [column.linear[i] for i in range(record.model.dimensions) for column in columns]
+
+
+def frame_jacobian(record: Recording, body: int, at: Vec) -> list[Twist]:
+    """The motion of a point that one of each velocity gives, in world axes."""
     d, nv = record.dynamics, len(record.v)
-    columns = observables.point_jacobian(
+    return observables.frame_jacobian(
         d.linkage, d.kinematics, d.origins, body, at, nv, record.scalars
     )
-    return [column[i] for i in range(record.model.dimensions) for column in columns]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.tree.forces import Wrench, at_parent
-from eomgen.dynamics.tree.frames import Mount, Rigid
+from eomgen.dynamics.tree.frames import Mount, Rigid, turned
 from eomgen.dynamics.tree.motion import inertial_force
 from eomgen.dynamics.tree.vectors import (
     Vec,
@@ -28,11 +28,10 @@ from eomgen.dynamics.tree.vectors import (
 )
 from eomgen.model.model import Model
 from eomgen.scalars.protocol import Scalar, Scalars
+from eomgen.tables.outputs import IN_PLANE, IN_SPACE
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 """The entries of an inertia."""
-IN_SPACE = ("m", "mx", "my", "mz", *(f"I{name}" for name in MOMENTS))
-IN_PLANE = ("m", "mx", "my", "Izz")
 ROTOR = "rotor"
 
 
@@ -77,19 +76,19 @@ def regressor(
     model, scalars = dynamics.model, dynamics.scalars
     moving = dynamics.accelerating(vd)
     links, nv = dynamics.kinematics.links, dynamics.nv
-    frames = {
-        model.bodies[bodies[0]].name: k for k in range(len(links)) if (bodies := _on(dynamics, k))
-    }
+    mounts = {b.name: m for b, m in zip(model.bodies, dynamics.linkage.mounts, strict=True)}
     columns = []
     for parameter in parameters:
         column = [scalars.number(0.0)] * nv
         if parameter.what == ROTOR:
             i = next(i for i in range(nv) if _coordinate(model, i) == parameter.of)
             column[i] = vd[i]
-        else:
-            k = frames[parameter.of]
-            mount = dynamics.linkage.mounts[_on(dynamics, k)[0]]
-            link = replace(links[k], rigid=_single(mount, parameter.what, scalars))
+        elif (k := mounts[parameter.of].frame) >= 0:
+            mount = mounts[parameter.of]
+            rigid = _single(mount, parameter.what, scalars)
+            if dynamics.kinematics.axes == "world":
+                rigid = turned(rigid, dynamics.kinematics.world[k])
+            link = replace(links[k], rigid=rigid)
             wrench = Wrench(*inertial_force(link, moving[k], scalars))
             while k >= 0:
                 for axis, i in links[k].free:

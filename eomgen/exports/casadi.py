@@ -19,9 +19,10 @@ from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scalars.protocol import Scalars
 from eomgen.store import interfaced_program_of
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
 NEEDED = "casadi: CasADi is not installed; run: pip install 'eomgen[casadi]'"
-FURTHER = {"forward_dynamics": "tau", "inverse_dynamics": "vd", "held": "forces"}
+FURTHER = {**{name: OUTPUTS[name].beside for name in DYNAMICS}, "held": "forces"}
 """What the fifth argument of an output that takes one is called; of others it is `extra`."""
 
 

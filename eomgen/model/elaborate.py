@@ -122,14 +122,18 @@ def outputs_for(
 ) -> tuple[str, ...]:
     """The outputs to generate, in the order of `OUTPUTS`.
 
-    `wanted` is "all" or names in `OUTPUTS`. "all" leaves out outputs that need what the model
-    lacks: `available` holds what it has of each kind, see `available_in`. Such an output asked for
-    by name raises `SceneError`. `location` is a format string for the location of a name, by its
-    index.
+    `wanted` is "all" or names in `OUTPUTS`. "all" stands for the usual ones, without those that
+    need what the model lacks: `available` holds what it has of each kind, see `available_in`. Such
+    an output asked for by name raises `SceneError`. `location` is a format string for the location
+    of a name, by its index.
     """
     needs = {name: spec.needs for name, spec in OUTPUTS.items() if spec.needs}
     if wanted == "all":
-        return tuple(name for name in OUTPUTS if name not in needs or available[needs[name]])
+        return tuple(
+            name
+            for name, spec in OUTPUTS.items()
+            if spec.usual and (name not in needs or available[needs[name]])
+        )
     for i, name in enumerate(wanted):
         if name in needs and not available[needs[name]]:
             raise SceneError(

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eomgen.run.problem import FloatArray
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
-BESIDE = ("forward_dynamics", "inverse_dynamics", "impact", "held")
+BESIDE = (*DYNAMICS, "impact", "held")
 _FLOAT = np.dtype(float)
 
 
@@ -53,17 +54,19 @@ def function(
     return compiled
 
 
-def reader_of(module: Any, name: str, size: int) -> Reader:
-    """The reader of a function of `BESIDE` that returns `size` numbers."""
+def reader_of(module: Any, name: str, shape: tuple[int, ...]) -> Reader:
+    """The reader of a function of `BESIDE` that returns an array of this shape."""
     ny = len(module.STATES)
     if name == "impact":
         return _impact(ny, len(module.CONTACTS))
     if name == "held":
         return _held(ny, len(module.CONTACTS))
-    nq, nv = len(module.POSITIONS), size
+    spec = OUTPUTS[name]
+    forces = shape[spec.of(module.DIMENSIONS)[0].index("nv")]
+    nq, nv = len(module.POSITIONS), forces
     if getattr(module, "FOLLOWING", ()):  # a velocity for each constraint
-        nv = size - len(module.CONSTRAINTS)
-    return _dynamics((nq, nv, ny - nq - nv), size, "tau" if name == "forward_dynamics" else "vd")
+        nv = forces - len(module.CONSTRAINTS)
+    return _dynamics((nq, nv, ny - nq - nv), forces, spec.beside)
 
 
 def _dynamics(sizes: tuple[int, int, int], forces: int, beside: str) -> Reader:

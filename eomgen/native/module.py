@@ -140,7 +140,7 @@ class Kernels:
                 return None
             return np.frombuffer(memoryview(out)).reshape(shape)
 
-        return function(python, one, reader_of(self.module, name, math.prod(shape)))
+        return function(python, one, reader_of(self.module, name, shape))
 
     def _columns(self, name: str, shape: tuple[int, ...]) -> Callable[..., FloatArray]:
         """The function of an output for columns of states."""

@@ -11,7 +11,7 @@ import numpy as np
 from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.run.problem import FloatArray
-from eomgen.tables.outputs import OUTPUTS
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
 OWN = (
     "constraint_residuals",
@@ -103,7 +103,7 @@ class Viewed:
         if name in ("jacobian", "parameter_jacobian", "input_jacobian"):
             raise AttributeError(name)
         found = getattr(self.own, name)
-        if name in ("forward_dynamics", "inverse_dynamics"):
+        if name in DYNAMICS:
             return lambda q, v, *extra, **more: self._split(found, q, v, *extra, **more)
         if name not in (*OUTPUTS, *OWN):
             return found

@@ -12,6 +12,9 @@ Size = str | int
 """The length of one axis of an array: a number, or its name."""
 ANGULAR = ("mx", "my", "mz", "wx", "wy", "wz", "lx", "ly", "lz", "angle")
 """Names of angular parts."""
+IN_PLANE = ("m", "mx", "my", "Izz")
+IN_SPACE = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+"""The inertial parameters of a body."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class OutputSpec:
     parts     the names along its last axis, by their number
     pure      those of its parts in space that have no unit
     group     the word for what is saved with it: energy, points or poses
+    usual     whether "all" stands for it, too
     """
 
     shape: tuple[Size, ...]
@@ -49,6 +53,7 @@ class OutputSpec:
     parts: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     pure: tuple[str, ...] = ()
     group: str = ""
+    usual: bool = True
 
     def of(self, dimensions: int) -> tuple[tuple[Size, ...], str]:
         """Shape and docstring in the plane or in space."""
@@ -74,6 +79,116 @@ def _force(about: str, builder: str, beside: str = "", *, contacts: bool = False
     """An output of generalised forces or accelerations, one for each velocity."""
     return OutputSpec(("nv",), about, builder, forms=False, contacts=contacts, beside=beside)
 
+
+FRAMES = {
+    "": "at the point, in world axes",
+    "_local": "at the point, in axes of the body",
+    "_world": "of the body's point at the world's origin, in world axes",
+}
+"""In which frame motions of points of bodies are given, by the ends of names of outputs."""
+
+
+def _unusual(
+    shape: tuple[Size, ...],
+    about: str,
+    builder: str,
+    space: tuple[Size, ...] | None = None,
+    needs: str = "",
+    beside: str = "",
+    parts: Mapping[int, tuple[str, ...]] | None = None,
+) -> OutputSpec:
+    """An output of the form [q, v] alone, for which "all" does not stand."""
+    return OutputSpec(
+        shape,
+        about,
+        f"of_robots:{builder}",
+        (space or shape, about),
+        needs,
+        forms=False,
+        beside=beside,
+        parts=parts or {},
+        usual=False,
+    )
+
+
+def _of_frames(name: str, about: str, builder: str, *axes: Size) -> dict[str, OutputSpec]:
+    """An output of motions of points for each of `FRAMES`."""
+    return {
+        name + end: _unusual(
+            ("points", 3, *axes),
+            about.format(where),
+            f"{builder}{end}",
+            ("points", 6, *axes),
+            "points",
+        )
+        for end, where in FRAMES.items()
+    }
+
+
+_OF_ROBOTS: Mapping[str, OutputSpec] = {
+    **_of_frames(
+        "frame_jacobians",
+        "Jacobian J of each of `POINTS`: J v is velocity (m/s) and angular velocity, {}.",
+        "frame_jacobians",
+        "nv",
+    ),
+    **_of_frames(
+        "frame_bias_accelerations",
+        "J̇ v of each of `POINTS`, with J {}: acceleration (m/s^2) and angular acceleration.",
+        "frame_bias_accelerations",
+    ),
+    "centre_of_mass_jacobian": _unusual(
+        ("dimensions", "nv"),
+        "Jacobian J of the centre of mass of all bodies, whose world velocity is J v.",
+        "centre_of_mass_jacobian",
+    ),
+    "centroidal_momentum_matrix": _unusual(
+        (3, "nv"),
+        "A: A v is momentum and angular momentum about the centre of mass of all bodies, world.",
+        "centroidal_momentum_matrix",
+        (6, "nv"),
+    ),
+    "operational_mobilities": _unusual(
+        ("points", 3, 3),
+        "J M^-1 Jᵀ of each of `POINTS`, J of `frame_jacobians`: accelerations by unit wrenches.",
+        "operational_mobilities",
+        ("points", 6, 6),
+        "points",
+    ),
+    "operational_inertias": _unusual(
+        ("points", 3, 3),
+        "(J M^-1 Jᵀ)^-1 of each of `POINTS`, J of `frame_jacobians`; it must have all its rank.",
+        "operational_inertias",
+        ("points", 6, 6),
+        "points",
+    ),
+    "coriolis_matrix": _unusual(
+        ("nv", "nv"),
+        "C(q, v) with C v = V unless joints are driven, and C + Cᵀ the rate of M.",
+        "coriolis_matrix",
+    ),
+    "regressor": _unusual(
+        ("nv", "bodies", 4),
+        "Y with M vd + V + G = Σ Y π without rotors: π mass, first moment, inertia of each body, "
+        "about its joint's point, body axes.",
+        "inertial_regressor",
+        ("nv", "bodies", 10),
+        beside="vd",
+        parts={4: IN_PLANE, 10: IN_SPACE},
+    ),
+    "inverse_dynamics_derivatives": _unusual(
+        (2, "nv", "nv"),
+        "Derivatives of `inverse_dynamics` by small motions along each velocity, and by `v`.",
+        "inverse_dynamics_derivatives",
+        beside="vd",
+    ),
+    "forward_dynamics_derivatives": _unusual(
+        (3, "nv", "nv"),
+        "Derivatives of `forward_dynamics` by small motions along each velocity, by `v`, by `tau`.",
+        "forward_dynamics_derivatives",
+        beside="tau",
+    ),
+}
 
 OUTPUTS: Mapping[str, OutputSpec] = {
     "forward_dynamics": _force(
@@ -249,6 +364,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         needs="parameters",
         by="parameters",
     ),
+    **_OF_ROBOTS,
 }
 """All outputs, in the order in which a module has them."""
 

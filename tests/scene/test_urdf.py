@@ -8,23 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import some
-from robot_files import GOOD_URDF
+from robot_files import GOOD_URDF, joint, link, written
 
 import eomgen
 from eomgen.commands.main import main
 from eomgen.scene.importers.rotations import angles_of, rotation, squared, to_axis
-
-LINK = """<link name="{name}"><inertial>
-  <origin xyz="{com}" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>
-  <inertia ixx="0.03" ixy="0.004" ixz="-0.002" iyy="0.04" iyz="0.003" izz="0.05"/>
-</inertial></link>
-"""
-JOINT = """<joint name="{name}" type="{kind}">
-  <origin xyz="0.1 -0.2 0.3" rpy="0.4 1.5707963267948966 -0.7"/>
-  <parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>{more}
-  <limit lower="-1" upper="1" effort="1" velocity="1"/>
-</joint>
-"""
 
 MIMIC = '<mimic joint="grip" multiplier="0.8" offset="0.05"/>'
 DRAWN = """<link name="base"><visual>{}
@@ -44,25 +32,6 @@ COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
 </node></visual_scene></library_visual_scenes>
 </COLLADA>
 """
-
-
-def link(name: str, com: str = "0.02 0.05 0.1") -> str:
-    """A link with an inertia in axes of its own."""
-    return LINK.format(name=name, com=com)
-
-
-def joint(
-    name: str, kind: str, parent: str, child: str, axis: str = "0 0 1", more: str = ""
-) -> str:
-    """A joint whose axes are rotated in its parent's."""
-    return JOINT.format(name=name, kind=kind, parent=parent, child=child, axis=axis, more=more)
-
-
-def written(folder: Path, *parts: str, name: str = "robot") -> Path:
-    """The file of a robot."""
-    path = folder / f"{name}.urdf"
-    path.write_text(f'<robot name="{name}">{"".join(parts)}</robot>', "utf-8")
-    return path
 
 
 def rates(tables: Any, **state: float) -> dict[str, float]:

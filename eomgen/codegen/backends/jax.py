@@ -25,6 +25,7 @@ from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.scalars.functions import FUNCTIONS
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
 SUFFIXES: tuple[str, ...] = ("_jax.py",)
 TEMPLATES = "jax"
@@ -35,11 +36,8 @@ LONGEST = 120
 BLOCK = 128
 """Columns that are computed together on a CPU."""
 WIDTH = 100
-DYNAMICS = {
-    "forward_dynamics": ("tau=None", "jnp.zeros_like(v) if tau is None else tau"),
-    "inverse_dynamics": ("vd", "vd"),
-}
-"""Outputs that take numbers beside the state: the argument, and what it is."""
+BESIDE = {"tau": ("tau=None", "jnp.zeros_like(v) if tau is None else tau"), "vd": ("vd", "vd")}
+"""The arguments beside the state, and what each is."""
 LEFT_OUT = ("impact", "held", "project_position", "project_velocity")
 """Outputs for simulations with contacts or loops, which take other arguments."""
 
@@ -72,7 +70,8 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
         "derivative": written["derivative"],
         "dynamics": [
             {**written[name], "argument": argument, "given": given}
-            for name, (argument, given) in DYNAMICS.items()
+            for name in DYNAMICS
+            for argument, given in [BESIDE[OUTPUTS[name].beside]]
             if name in written
         ],
         "outputs": [kernel for name, kernel in written.items() if name not in special],

@@ -18,6 +18,7 @@ from eomgen.language.formula import names_in
 from eomgen.program.printing import Block, Dialect
 from eomgen.program.program import Program, live_steps
 from eomgen.scalars.functions import FUNCTIONS
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
 SUFFIXES: tuple[str, ...] = (".py",)
 TEMPLATES = "python"
@@ -91,7 +92,7 @@ def module(program: Program, interface: Interface) -> str:
     refused = refusals(interface, DIALECT)
     others = (*constants.functions, *refused.functions)
     called = [f for f in FUNCTIONS if f in moving or f in others]
-    dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
+    dynamics = [(n, OUTPUTS[n].beside, "=None" * (OUTPUTS[n].beside == "tau")) for n in DYNAMICS]
     matrices = [k.function.name for k in kernels if k.function.matrix]
     special = {"initial_state", "derivative", *matrices, *(name for name, _, _ in dynamics)}
     special |= {"impact", "held"}

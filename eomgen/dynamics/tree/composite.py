@@ -160,3 +160,14 @@ def solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
         for i in factors.above[k]:
             x[k] = x[k] - factors.lower[k, i] * x[i]
     return x
+
+
+def inverse(matrix: Sequence[Sequence[Scalar]], scalars: Scalars) -> list[list[Scalar]]:
+    """The inverse of a small positive definite matrix, by the same factors."""
+    n = range(len(matrix))
+    entries = {(i, j): matrix[i][j] for i in n for j in range(i + 1)}
+    above = tuple(tuple(reversed(range(i))) for i in n)
+    factors = factorised(entries, above, [str(i) for i in n], scalars)
+    zero, one = scalars.number(0.0), scalars.number(1.0)
+    columns = [solved(factors, [one if i == j else zero for i in n]) for j in n]
+    return [[columns[min(i, j)][max(i, j)] for j in n] for i in n]

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from eomgen.dynamics.tree.rotations import IdentityRotation, Rotation
-from eomgen.dynamics.tree.vectors import Symmetric, Vec, add, plus
+from eomgen.dynamics.tree.vectors import Mat, Symmetric, Vec, add, congruent, plus, times
 from eomgen.scalars.exact import Matrix, Real
 from eomgen.scalars.protocol import Scalar
 
@@ -23,6 +23,12 @@ class Rigid:
 def joined(a: Rigid, b: Rigid) -> Rigid:
     """The sum of two rigid-body inertias about the same origin."""
     return Rigid(a.mass + b.mass, add(a.first_moment, b.first_moment), plus(a.inertia, b.inertia))
+
+
+def turned(body: Rigid, axes: Mat) -> Rigid:
+    """A rigid-body inertia in other axes: `axes` are from its own to those."""
+    first = times(axes, body.first_moment)
+    return Rigid(body.mass, first, congruent(axes, body.inertia))
 
 
 @dataclass(frozen=True)

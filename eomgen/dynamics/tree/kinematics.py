@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.dynamics.tree.frames import Frame, Linkage, Rigid
+from eomgen.dynamics.tree.frames import Frame, Linkage, Rigid, turned
 from eomgen.dynamics.tree.rotations import (
     IdentityRotation,
     Rotation,
@@ -24,7 +24,6 @@ from eomgen.dynamics.tree.vectors import (
     Mat,
     Vec,
     add,
-    congruent,
     scale,
     times,
     transposed,
@@ -164,8 +163,7 @@ def tree_kinematics(
         if axes == "world":
             rotation, arm = IdentityRotation(), times(base, arm)
             directions = tuple(_rotated(axis, world[-1], linkage.planar) for axis in directions)
-            first = times(world[-1], rigid.first_moment)
-            rigid = Rigid(rigid.mass, first, congruent(world[-1], rigid.inertia))
+            rigid = turned(rigid, world[-1])
         links.append(
             Link(
                 frame.name,

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
+from eomgen.dynamics.tree.composite import composite_bodies, force_to_move
 from eomgen.dynamics.tree.frames import Linkage
 from eomgen.dynamics.tree.kinematics import TreeKinematics
-from eomgen.dynamics.tree.motion import Twist, momentum_of
+from eomgen.dynamics.tree.motion import Acceleration, Twist, momentum_of
 from eomgen.dynamics.tree.vectors import (
     Mat,
     Vec,
@@ -104,7 +105,7 @@ def momentum(
     return linear, angular
 
 
-def point_jacobian(
+def frame_jacobian(
     linkage: Linkage,
     kinematics: TreeKinematics,
     where: Origins,
@@ -112,9 +113,12 @@ def point_jacobian(
     at: Vec,
     nv: int,
     scalars: Scalars,
-) -> list[Vec]:
-    """The Jacobian of a point's velocity, in world axes: one column for each free velocity."""
-    columns = [zeros(scalars)] * nv
+) -> list[Twist]:
+    """The velocity of a point and the body's angular velocity, in world axes, that one of each free
+    velocity gives.
+    """
+    nothing = zeros(scalars)
+    columns = [Twist(nothing, nothing)] * nv
     frame = linkage.mounts[body].frame
     point = position(linkage, kinematics, where, body, at, scalars)
     while frame >= 0:
@@ -122,6 +126,50 @@ def point_jacobian(
         for axis, i in link.free:
             direction = kinematics.to_world(frame, axis.direction)
             reach = sub(point, where[frame])
-            columns[i] = cross(direction, reach) if axis.angular else direction
+            columns[i] = (
+                Twist(direction, cross(direction, reach))
+                if axis.angular
+                else Twist(nothing, direction)
+            )
         frame = link.parent
     return columns
+
+
+def centroidal_momentum(
+    kinematics: TreeKinematics, where: Origins, centre: Vec, nv: int, scalars: Scalars
+) -> list[tuple[Vec, Vec]]:
+    """Momentum and angular momentum about a point `centre`, in world axes, that one of each free
+    velocity gives.
+    """
+    nothing = zeros(scalars)
+    columns = [(nothing, nothing)] * nv
+    bodies = composite_bodies(kinematics, scalars)
+    for k, link in enumerate(kinematics.links):
+        for axis, i in link.free:
+            motion = (axis.direction, nothing) if axis.angular else (nothing, axis.direction)
+            wrench = force_to_move(bodies[k], *motion)
+            momentum = kinematics.to_world(k, wrench.force)
+            about = kinematics.to_world(k, wrench.moment)
+            columns[i] = momentum, add(about, cross(sub(where[k], centre), momentum))
+    return columns
+
+
+def acceleration(
+    linkage: Linkage,
+    kinematics: TreeKinematics,
+    accelerating: Sequence[Acceleration],
+    body: int,
+    at: Vec,
+    scalars: Scalars,
+) -> Twist:
+    """The acceleration of a point of a body and the body's angular acceleration, in world axes, at
+    accelerations of the frames.
+    """
+    frame = linkage.mounts[body].frame
+    if frame < 0:
+        return Twist(zeros(scalars), zeros(scalars))
+    a = accelerating[frame]
+    mount = linkage.mounts[body]
+    own = add(mount.at, times(constant(mount.axes, scalars), at))
+    linear = add(a.linear, times(a.field, kinematics.of_frame(frame, own)))
+    return Twist(kinematics.to_world(frame, a.angular), kinematics.to_world(frame, linear))

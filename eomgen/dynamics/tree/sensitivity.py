@@ -113,6 +113,48 @@ def sensitivity(
     return Sensitivity(by_q, by_v)
 
 
+def coriolis(kinematics: TreeKinematics, twists: Sequence[Twist], scalars: Scalars) -> Entries:
+    """The entries of C, by which C v is the velocity force and C + Cᵀ the rate of M; `kinematics`
+    and twists are in world axes: C_ij = S_i · (I S_j' + ½ B S_j) with sums over the subtree of the
+    axis farther from the root (S. Echeandia and P. Wensing, "Numerical methods to compute the
+    Coriolis matrix and Christoffel symbols for rigid-body systems", J. Comput. Nonlinear Dynam. 16,
+    2021).
+    """
+    assert kinematics.axes == "world"
+    links, nothing = kinematics.links, zeros(scalars)
+    bodies = composite_bodies(kinematics, scalars)
+    halves = [
+        _Drag(drag.momentum, drag.matrix, scalars.number(1.0))
+        for drag in _composite_drags(kinematics, twists, scalars)
+    ]
+    axes = [
+        [
+            Twist(axis.direction, nothing) if axis.angular else Twist(nothing, axis.direction)
+            for axis, _ in link.free
+        ]
+        for link in links
+    ]
+    rates = [
+        [_crossed(motion, axis) for axis in own] for motion, own in zip(twists, axes, strict=True)
+    ]
+    entries: dict[tuple[int, int], Scalar] = {}
+    for k, link in enumerate(links):
+        for axis, rate, (_, i) in zip(axes[k], rates[k], link.free, strict=True):
+            reach = force_to_move(bodies[k], axis.angular, axis.linear)
+            pull = halves[k].transposed_times(axis)
+            sped = total(_moved(bodies[k], rate), halves[k].times(axis))
+            above = k
+            while above >= 0:
+                outer = links[above]
+                for other, slope, (_, j) in zip(axes[above], rates[above], outer.free, strict=True):
+                    entries[i, j] = _work(slope, reach) + dot(pull, other.angular)
+                    if above != k:
+                        entries[j, i] = _work(other, sped)
+                reach, sped = at_parent(outer, reach), at_parent(outer, sped)
+                above = outer.parent
+    return entries
+
+
 def _columns(
     kinematics: TreeKinematics,
     k: int,
