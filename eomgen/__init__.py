@@ -11,6 +11,7 @@ from eomgen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
+    from eomgen.api.controllers import Controller
     from eomgen.api.derivation import Derivation
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from eomgen.scene.schema import Scene
 
 __all__ = [
+    "Controller",
     "Derivation",
     "Ensemble",
     "EomgenError",
@@ -79,6 +81,7 @@ _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "Derivation": "api.derivation",
+    "Controller": "api.controllers",
     "derive": "api.deriving",
     "environment": "api.environments",
     "export": "api.exporting",

@@ -280,6 +280,18 @@ def Disc(
     """A disc of `radius` m about `center`, in body axes; in the plane."""
     ...
 
+def DiscreteState(
+    *,
+    initial: float = ...,
+    next: float | str,
+    unit: str = ...,
+    about: str = ...,
+) -> Table:
+    """A state z of a sampled controller: it is `initial` before the first sample, and `next` after
+    each one.
+    """
+    ...
+
 def Distance(
     *,
     name: str,
@@ -917,6 +929,29 @@ def RopePoint(
     """
     ...
 
+def SampledController(
+    *,
+    name: str,
+    period: float,
+    delay: float = ...,
+    sensors: Mapping[str, Table | Mapping[str, Any]] = ...,
+    states: Mapping[str, Table | Mapping[str, Any]] = ...,
+    inputs: Mapping[str, float | str] = ...,
+    torques: Mapping[str, float | str] = ...,
+    seed: float | str = ...,
+) -> Table:
+    """At t = 0, `period`, 2 `period`, … it reads `sensors`, then gives inputs of the scene and
+    torques at joints the values of their formulas, and its states those of `next`. Between samples
+    all of them are held.
+
+    Formulas use t, coordinates, velocities, parameters, readings of this sample, and states and
+    inputs as they were before it; so none depends on itself. Sensors do not use readings of the
+    same sample. With `delay` inputs and torques change so many seconds after the sample. Readings,
+    states and held values are states of the module. Noise follows from `seed`, which is a
+    parameter, the number of the sensor and that of the sample alone, and is the same everywhere.
+    """
+    ...
+
 def Scene(
     *,
     name: str,
@@ -943,6 +978,20 @@ def Scene(
     camera: Table | Mapping[str, Any] = ...,
 ) -> _Scene:
     """A whole scene."""
+    ...
+
+def Sensor(
+    *,
+    value: float | str,
+    noise: float | str = ...,
+    quantum: float | str = ...,
+    unit: str = ...,
+    about: str = ...,
+) -> Table:
+    """A sensor of a sampled controller: it measures `value`, adds normal noise of the standard
+    deviation `noise`, and rounds to a multiple of `quantum`. Its last reading is a state with its
+    name, which formulas use.
+    """
     ...
 
 def Simulation(

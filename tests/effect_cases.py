@@ -240,6 +240,10 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
      'about = "marker" } }; torques = { hinge = "-3*marker_z", rail = "-s - log(1 + t*t)" }',
      NO_ENERGY),
     ("controller", "no state", 'torques = { hinge = "acos(tanh(q)) + asin(tanh(s))" }', NO_ENERGY),
+    ("sampled_controller", "sensors",
+     'period = 0.1; sensors = { marker_s = { value = "q", noise = 0.1, quantum = 0.01 } }; '
+     'states = { marker_z = { next = "marker_z + marker_s" } }; delay = 0.25; seed = 3; '
+     'inputs = {}; torques = { hinge = "-3*marker_s - marker_z", rail = "-s" }', NO_ENERGY),
     ("driven", "hinge", 'joint = "hinge"; coordinate = "0.3 - 0.3*cos(5*t)"', NO_ENERGY),
     ("driven", "rail", 'joint = "rail"; coordinate = "0.4*t*t*abs(t)"', NO_ENERGY),
 ]  # fmt: skip

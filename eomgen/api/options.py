@@ -14,6 +14,7 @@ from eomgen.base.options import about, flag_of, option, options_of
 from eomgen.tables.routes import ROUTES
 
 if TYPE_CHECKING:
+    from eomgen.api.controllers import Controllers
     from eomgen.api.given import Outputs, Source, Values
     from eomgen.api.inputs import Inputs
     from eomgen.api.runs import Run
@@ -194,6 +195,12 @@ class RunOptions(Method, Started, Formed):
         "input, and any others; between these times inputs are linear. With tables and "
         "functions nothing is compiled. Inputs that are not given have their defaults"
     )
+    controllers: "Controllers" = option(
+        (),
+        "controllers that sample: tables as those of an effect `sampled_controller`, or "
+        "`eomgen.Controller(...)` of a function; their inputs are held between samples",
+        flag=None,
+    )
     samples: int = option(1001, "approximate number of rows to keep")
     works: bool = option(False, "also compute the work of each effect, J")
     save: Sequence[str] = option(
@@ -251,6 +258,9 @@ class SweepOptions(Method):
     inputs: "Inputs | None" = _inputs(
         "values that all members have; also formulas of t, the motion and parameters, or the "
         "path of a table, as for `simulate`; with a table nothing is compiled"
+    )
+    controllers: "Controllers" = option(
+        (), "controllers that sample, as for `simulate`; tables alone, no functions", flag=None
     )
     outputs: Sequence[str] = option(
         (),

@@ -10,9 +10,11 @@ from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import values_by_index
 from eomgen.base.errors import RunError, nearest
+from eomgen.base.frozen import FrozenDict
 from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.run.inputs import InputsOfTime
+from eomgen.run.sampling import Function
 from eomgen.scene.schema import SHOWN, LoopsKept, Scene
 from eomgen.tables.integrators import INTEGRATORS
 from eomgen.tables.outputs import GROUPS, SAVED
@@ -35,6 +37,7 @@ class Plan:
     outputs     those that the caller named
     state       values of the initial state, by index in [q, v, x]
     varying     all inputs, if some of them are tables or functions of time
+    functions   controllers that are functions of Python, by name
     """
 
     scene: Scene
@@ -47,6 +50,7 @@ class Plan:
     outputs: Sequence[str] = ()
     state: Mapping[int, float] = field(default_factory=dict)
     varying: InputsOfTime | None = None
+    functions: Mapping[str, Function] = field(default_factory=dict)
 
     @property
     def works(self) -> bool:
@@ -61,13 +65,15 @@ def plan_run(
     *,
     constants: Values | None = None,
     varying: InputsOfTime | None = None,
+    functions: Mapping[str, Function] = FrozenDict({}),
     outputs: Sequence[str] = (),
     reporter: Reporter = SILENT,
 ) -> Plan:
     """Check the options of `simulate` for a scene's model. Raises `RunError`.
 
     Of inputs `constants` are constant; `varying` are all of them if some are not, see
-    `inputs.applied`. `outputs` must be in the module.
+    `inputs.applied`. `outputs` must be in the module. Controllers that are `functions` are not
+    repeated by trials and second runs.
     """
     bounds = {"rtol": options.rtol, "atol": options.atol, "dt": options.dt}
     aims = [name for name in ("accuracy", "budget") if getattr(options, name) is not None]
@@ -80,6 +86,11 @@ def plan_run(
         setting = setting_of(scene.simulation, options.integrator, **bounds, reporter=reporter)
     if varying is not None:
         _check_varying(options, aims, setting, reporter)
+    if functions and (aims or options.estimate):
+        raise RunError(
+            f"{reporter.argument('controllers')}: functions of Python do not go together with a "
+            "choice of method or an estimate; give formulas, or leave the other option out"
+        )
     if options.unstable:
         check_unstable(setting, reporter)
     plan = Plan(
@@ -93,6 +104,7 @@ def plan_run(
         outputs,
         values_by_index(model, options.state, reporter),
         varying,
+        functions,
     )
     saved = wanted_outputs(options.save, model, reporter)
     more = (*(("effect_powers",) if plan.works else ()), *_of_method(setting, model))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from eomgen.api.controllers import with_controllers
 from eomgen.api.generating import compiled
 from eomgen.api.given import model_of, overridden, read
 from eomgen.api.inputs import applied
@@ -62,9 +63,10 @@ def simulate(options: RunOptions) -> Run:
 def plan_of(options: RunOptions, reporter: Reporter = SILENT) -> Plan:
     """The plan of a run. Raises `SceneError` or `RunError`."""
     source = options.source
-    scene, constants, varying = applied(read(source), options.inputs, reporter)
+    scene, functions = with_controllers(read(source), options.controllers, reporter)
+    scene, constants, varying = applied(scene, options.inputs, reporter)
     model = overridden(model_of(scene, source), form=options.form, route=options.route)
-    given: dict[str, Any] = {"constants": constants, "varying": varying}
+    given: dict[str, Any] = {"constants": constants, "varying": varying, "functions": functions}
     return plan_run(scene, model, options, **given, reporter=reporter)
 
 
@@ -246,6 +248,9 @@ def _problem(
             replace(state, initial=value) for state, value in zip(model.extra, x, strict=True)
         )
         model = replace(model, initial_q=q, initial_v=v, extra=tuple(states))
+    if plan.functions and problem.sampling:
+        sampling = replace(problem.sampling, functions=plan.functions)
+        problem = replace(problem, sampling=sampling, origin=None)  # a file does not hold functions
     if plan.varying:
         problem = with_corners(problem, module, values[0], plan.varying)
         problem = replace(problem, origin=None)  # a file does not hold functions

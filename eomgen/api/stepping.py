@@ -14,6 +14,7 @@ from eomgen.api.public import public
 from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
+from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.native.lanes import columns_of
 from eomgen.native.stepper import METHODS, Beside, CompiledSteps, Limits
@@ -78,6 +79,7 @@ def _made(
     """The same of a model, for arguments that are known to be right; `rest` is the speed below
     which rigid contacts do not bounce, or None.
     """
+    check_no_samples(model, "steps of a stepper")
     _, plain = compiled(model)
     problem = problem_of(plain, model=model)
     check_columns(problem, method, METHODS)

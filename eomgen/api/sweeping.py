@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.api.controllers import with_controllers
 from eomgen.api.generating import compiled
 from eomgen.api.given import Values, check_name, model_of, read, values_of
 from eomgen.api.inputs import for_members
@@ -87,7 +88,10 @@ def ensemble(options: SweepOptions) -> Ensemble:
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene, constants, varying = for_members(read(options.source), options.inputs)
+    scene, functions = with_controllers(read(options.source), options.controllers)
+    if functions:
+        raise RunError("controllers: functions of Python run in simulate alone; give formulas")
+    scene, constants, varying = for_members(scene, options.inputs)
     model = model_of(scene, options.source)
     return run_sweep(plan_sweep(scene, model, options, constants=constants, varying=varying))
 
@@ -270,10 +274,10 @@ def _compiles(plan: SweepPlan, reporter: Reporter) -> bool:
 
 
 def _run_together(integrator: str, functions: Any) -> bool:
-    """Whether members run together: by a method that can do that, of a module without contacts
-    and constraints, and for adaptive methods without other one-sided forces.
+    """Whether members run together: by a method that can do that, of a module without contacts,
+    constraints and sampled controllers, and for adaptive methods without other one-sided forces.
     """
-    alone = any(getattr(functions, name, ()) for name in ("CONTACTS", "CONSTRAINTS"))
+    alone = any(getattr(functions, name, ()) for name in ("CONTACTS", "CONSTRAINTS", "CONTROLLERS"))
     if integrator not in METHODS or not functions.STATES or alone:
         return False
     switching = ("switching_functions", "_switching_functions_of_time")
@@ -287,6 +291,8 @@ def _mostly_in_c(integrator: str, functions: Any) -> bool:
     those that pass over a corner, and begins anew after an event if it keeps constraints.
     """
     method = find_integrator(integrator)
+    if hasattr(functions, "CONTROLLERS"):
+        return False
     if isinstance(method, FixedStep) or not method.compiled:
         return bool(method.compiled)
     begins_anew = getattr(functions, "CONTACTS", ()) and (

@@ -7,8 +7,10 @@ from eomgen.codegen.constraints import constraint_outputs
 from eomgen.codegen.contacts import contact_labels, contact_outputs
 from eomgen.codegen.jacobians import matrices
 from eomgen.codegen.recording import Recording
+from eomgen.codegen.sampling import sampling_labels, sampling_outputs
 from eomgen.codegen.system import (
     OutputNodes,
+    SamplingLabel,
     System,
     names_of_inputs,
     output_shape,
@@ -56,10 +58,17 @@ def from_recursion(
     if model.constraints:
         parts = constraint_outputs(record)
         nodes |= {name: (shape, record.closed(part)) for name, (shape, part) in parts.items()}
+    states = velocity_states(model)
+    sampling: tuple[SamplingLabel, ...] = ()
+    if any(effect.sampling() for effect in model.effects):
+        more, more_extra = sampling_outputs(record)
+        nodes, extra = nodes | more, extra | more_extra
+        sampling = sampling_labels(model, [state.name for state in states])
     tangents = derivatives.tangents
     program = recorded(tape, nodes, [*checks(record), *conditions], tangents)
     labels = contact_labels(record.dynamics)
-    return System(model, record.route, velocity_states(model), program, extra, tangents, labels)
+    given_of = model, record.route, states, program, extra, tangents
+    return System(*given_of, labels, sampling)
 
 
 def output(record: Recording, name: str, extra: ExtraInputs) -> list[Node]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eomgen.codegen.system import ContactLabel, System
+from eomgen.codegen.system import ContactLabel, SamplingLabel, System
 from eomgen.language.conditions import Condition, is_of_size
 from eomgen.language.formula import written
 from eomgen.model.bodies import Prescribed
@@ -24,6 +24,8 @@ ABOUT = {
     "constraint_margins": "How far each of `CONSTRAINTS` is from following from others{}.",
     "project_position": "Coordinates (nq,) after one Newton step towards the constraints.",
     "project_velocity": "Velocities (nv,) that meet the constraints, the nearest.",
+    "samples": "What samples of `CONTROLLERS` set, with a normal number for each noise.",
+    "seeds": "The seed of the noise of each of `CONTROLLERS`.",
     "switching_functions": "`derivative` changes its branch where one of these passes 0.",
     "switching_functions_of_time": "As `switching_functions`; these depend on time only.",
 }
@@ -90,6 +92,7 @@ class Interface:
     joints          names of the joints that transmit constraint forces
     driven, locked  prescribed coordinates
     contacts        rigid contacts
+    sampling        effects that sample
     constraints     name and unit of the multiplier of each row of the constraints
     velocity_rows   names of those rows that restrict velocities alone
     following       name, unit and description of each coordinate and velocity that follows from
@@ -119,6 +122,7 @@ class Interface:
     driven: tuple[Given, ...]
     locked: tuple[Given, ...]
     contacts: tuple[ContactLabel, ...]
+    sampling: tuple[SamplingLabel, ...]
     constraints: tuple[tuple[str, str], ...]
     velocity_rows: tuple[str, ...]
     following: tuple[tuple[str, str, str], ...]
@@ -160,6 +164,7 @@ def interface_of(system: System) -> Interface:
         driven=tuple(map(_given, model.driven)),
         locked=tuple(_given(c) for c in model.prescribed if c.locked),
         contacts=system.contacts,
+        sampling=system.sampling,
         constraints=model.rows,
         velocity_rows=model.velocity_rows,
         following=_following(model),

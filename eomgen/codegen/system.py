@@ -32,6 +32,27 @@ class ContactLabel:
 
 
 @dataclass(frozen=True)
+class SamplingLabel:
+    """An effect that samples at each `period`-th tick of a clock, from tick 0 on.
+
+    per_second   ticks in a second, the same for all of them: tick n is at n / `per_second`, s
+    period, lag  ticks from a sample to the next, and to the moves that follow it; no moves if the
+                 lag is 0
+    sets         indices of the states that its sample sets, in the order of `samples`
+    moves        pairs of indices of states, of which the first takes the value of the second
+    noises       names of its sensors that take a normal number
+    """
+
+    effect: str
+    per_second: int
+    period: int
+    lag: int
+    sets: tuple[int, ...]
+    moves: tuple[tuple[int, int], ...]
+    noises: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class System:
     """A model's program.
 
@@ -39,6 +60,7 @@ class System:
               parameters and inputs: generalised forces or accelerations, or a direction
     tangents  matrices of derivatives whose output is their product with the direction in `extra`
     contacts  the rigid contacts
+    sampling  the effects that sample
     reports   the size of the program before all passes and after each; () if none has run
     """
 
@@ -49,6 +71,7 @@ class System:
     extra: Mapping[str, tuple[str, ...]]
     tangents: frozenset[str]
     contacts: tuple[ContactLabel, ...] = ()
+    sampling: tuple[SamplingLabel, ...] = ()
     reports: tuple[PassReport, ...] = ()
 
 

@@ -30,6 +30,7 @@ from eomgen.engine import (
     roots,
     rosenbrock,
     sampled,
+    sampling,
     separable,
     sums,
     symmetric,
@@ -93,7 +94,7 @@ CODES = {
 def text() -> Text:
     """The text of the whole engine."""
     adapted = (adaptive, adaptive_runs, adaptive_steps)
-    steps = (equal_steps, explicit, implicit, rosenbrock, sampled, taylor)
+    steps = (equal_steps, explicit, implicit, rosenbrock, sampled, sampling, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)

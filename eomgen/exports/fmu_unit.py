@@ -10,6 +10,7 @@ from eomgen.codegen.series import FIXED, with_series
 from eomgen.exports.directions import with_directions
 from eomgen.exports.steps import nominals_of, size_of, start_of
 from eomgen.exports.units import rate_of
+from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
 from eomgen.program.program import Program
@@ -104,6 +105,7 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
         raise SceneError(
             f"form: an FMU has the state [q, v], not the form '{model.form}'; leave it out"
         )
+    check_no_samples(model, "FMUs")
     outputs = (*ENERGIES, POSES, *(name for name in needed if name in OUTPUTS))
     program, interface = interfaced_program_of(replace(model, outputs=outputs))
     starts = start_of(program, interface)

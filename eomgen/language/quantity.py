@@ -174,7 +174,7 @@ def name_quantities(
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
         named: list[Formula] = []
-        for formula, suffix, key_path, off_diagonal in _parts(value, field):
+        for formula, suffix, key_path, off_diagonal in _parts(value, info.alias or field):
             where = f"{location}.{key_path}"
             bound = _bound(table, str(extra["bound"]), off_diagonal)
             by_joint = isinstance(value, dict)
@@ -185,7 +185,7 @@ def name_quantities(
             moving = _sees_motion(formula, where, known, motion, _listed(extra.get("sees")))
             if isinstance(formula, Constant) and formula.value != 0.0:
                 what = of_joint(str(info.description), slides) + suffix.replace("_", ", ", 1)
-                name = f"{prefix}_{field}{suffix}"
+                name = f"{prefix}_{info.alias or field}{suffix}"
                 parameters.append(Parameter(name, formula.value, unit, f"{prefix}: {what}", where))
                 formula = Name(name)
             named.append(formula)

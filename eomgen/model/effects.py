@@ -49,6 +49,20 @@ def inputs_and_states(
     return tuple(inputs), tuple(states)
 
 
+def in_units_of(
+    held: Collection[str], scene: Scene, states: Sequence[ExtraState], scope: Scope
+) -> tuple[ExtraState, ...]:
+    """The states, of which those that hold inputs of the scene have their units and defaults."""
+    inputs, _ = inputs_and_states(scene, scene.effects if held else (), scope)
+    known = {i.name: i for i in inputs if i.name in held}
+    for sampling in filter(None, (effect.sampling() for effect in scene.effects)):
+        known |= {x: known[n] for n, due in sampling.due.items() if n in known for x in due}
+    return tuple(
+        replace(x, unit=known[x.name].unit, initial=known[x.name].default) if x.name in known else x
+        for x in states
+    )
+
+
 def _at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
     """An input or extra state with the unit and description for the effect's joint, if any."""
     slides = about_slides(effect, sliding)

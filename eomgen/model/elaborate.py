@@ -9,18 +9,20 @@ from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia,
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model.bodies import Body, Point, Prescribed, prescribed_of, velocities_of
+from eomgen.model.clocks import clocks_of
 from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import (
     check_contacts,
     constraints_in_force,
     effects_in_force,
+    in_units_of,
     inputs_and_states,
     sliding_in,
 )
 from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
-from eomgen.model.inputs import own_inputs
+from eomgen.model.inputs import own_inputs, with_held_inputs
 from eomgen.model.model import Model
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
@@ -40,6 +42,7 @@ def elaborate(scene: Scene) -> Model:
     Raises `SceneError`, naming location, value and remedy, if the scene does not describe a
     mechanism, or if its `[view]` does not fit the mechanism.
     """
+    given, (scene, held) = scene, with_held_inputs(scene)
     own = _scene_parameters(scene)
     scope = Scope({p.name: p.default for p in own}, _moving(scene))
     scene = with_definitions(scene, scope.moving)
@@ -51,6 +54,8 @@ def elaborate(scene: Scene) -> Model:
     constraints, of_constraints = _loops(scene, bodies, scope)
     found = joined([Bindings(own), of_bodies, of_effects, of_points, of_constraints])
     inputs, states = inputs_and_states(scene, effects, scope)
+    states = in_units_of(held, given, states, scope)
+    clocks_of(effects)  # raises SceneError if what samples has no common clock
     if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is not a weld")
     _check_symbols(n, found.parameters, links, bodies, effects, scene)
@@ -114,6 +119,7 @@ def _notices(effects: Sequence[Effect], values: Mapping[str, float]) -> Iterator
 
 def expanded(scene: Scene) -> Scene:
     """The scene with its definitions expanded. Raises `SceneError` as `with_definitions` does."""
+    scene, _ = with_held_inputs(scene)
     return with_definitions(scene, _moving(scene))
 
 

@@ -122,6 +122,11 @@ class Model(Displayed):
         return tuple(c for c in self.constraints if isinstance(c, LoopJoint))
 
     @property
+    def sampled(self) -> tuple[str, ...]:
+        """The names of the effects that sample."""
+        return tuple(effect.name for effect in self.effects if effect.sampling())
+
+    @property
     def force_joints(self) -> tuple[str, ...]:
         """Names of the joints that transmit constraint forces: those of the tree, then loops."""
         return (*(b.joint.name for b in self.holding), *(loop.name for loop in self.loops))

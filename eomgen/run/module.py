@@ -16,6 +16,7 @@ from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
 from eomgen.run.projection import projection_of
+from eomgen.run.sampling import sampling_of
 from eomgen.run.sizes import mechanism_size, row_sizes, state_sizes
 from eomgen.run.solved_loops import solved_loops_of
 from eomgen.run.works import Powers
@@ -145,6 +146,7 @@ def as_problem(
         timed=_depends_on_time(module),
         projection=projection,
         solved_loops=solved_loops,
+        sampling=sampling_of(module, parameters, inputs),
     )
 
 

@@ -123,6 +123,7 @@ class Problem:
                 raises `RunError` where that is not possible
     projection  onto the constraints; None if there are none
     solved_loops the constraints that are kept in closed form; None if there are none
+    sampling    controllers that sample; None if there are none
     scrutiny    what is checked beside that; None for an ordinary run
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
@@ -151,6 +152,7 @@ class Problem:
     projection: Projection | None = None
     solved_loops: SolvedLoops | None = None
     scrutiny: Scrutiny | None = None
+    sampling: Any = None  # a `run.sampling.Sampling`, which knows problems
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -30,6 +30,7 @@ from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.integrators.stepper import Settings
 from eomgen.run.options import Wanted
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.sampling import Between, sampled
 
 Rows = Callable[[float, float], Sequence[float]]
 """(a, b) -> the times of the rows of a run after a, up to b, s."""
@@ -63,6 +64,8 @@ class Asked(Wanted):
         given, earlier = vars(wanted), wanted.resume
         grid = t_start = float(wanted.t_start)
         problem = wanted.problem
+        if earlier is None and problem.sampling and t_start == 0:
+            problem = problem.sampling.begun(problem)
         if earlier is not None:
             t_start = float(earlier["t"])
             grid = float(earlier.get("grid", t_start))
@@ -142,7 +145,13 @@ def _equal_steps(
         return [*found, b] if b == asked.t_end else found
 
     strikes = [compiled.strikes] if compiled else []
-    begin = partial(fixed_step.advances, settings)
+
+    def between(start: float, end: float) -> Begin:
+        before = round((start - asked.grid) / dt)
+        part = Grid(start, end, dt, every, before, end == asked.t_end)
+        return partial(fixed_step.advances, replace(settings, grid=part))
+
+    begin = _begin(asked, whole, between, partial(fixed_step.advances, settings))
     return Steps(begin, rows, _settings(asked, dt), *strikes)
 
 
@@ -171,10 +180,21 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
 
     limits = numbers(longest=bounds.longest, unseen=bounds.unseen)
     kept = {**_settings(asked, None), **limits}
-    begin = partial(adaptive.advances, settings)
+
+    def between(start: float, end: float) -> Begin:
+        return partial(adaptive.advances, replace(settings, t_end=end))
+
+    begin = _begin(asked, problem, between, partial(adaptive.advances, settings))
     if compiled and not asked.powers and method.compiled:
         return Steps(begin, rows, kept, compiled.strikes)
     return Steps(begin, rows, kept)
+
+
+def _begin(asked: Asked, problem: Problem, between: Between, whole: Begin) -> Begin:
+    """The steps of a run, of which `whole` makes all if nothing samples."""
+    if problem.sampling is None:
+        return whole
+    return sampled(problem.sampling, between, asked.grid, asked.t_end)
 
 
 def tolerances_of(asked: Asked, problem: Problem) -> Tolerances:

@@ -27,7 +27,7 @@ def goes_through(problem: Problem) -> bool:
     """Whether compiled code can go through all events of a problem: its derivative is smooth
     between those of rigid contacts, and nothing else is checked of steps.
     """
-    checked = problem.projection or problem.solved_loops or problem.scrutiny
+    checked = problem.projection or problem.solved_loops or problem.scrutiny or problem.sampling
     return bool(problem.contacts) and not (checked or problem.corners or problem.switching)
 
 

@@ -37,6 +37,7 @@ class Language:
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
     prelude       what the printed functions need
+    random        what those need beside that call `uniform`
     literal       how a number is written
     typed         whether arguments and results have types, and records structures
     listed        how four entries of an array of numbers that follow one another are given, from
@@ -55,6 +56,7 @@ class Language:
     array: str = ""
     part: str = ""
     literal: str = "{}"
+    random: str = ""
     typed: bool = False
     listed: str = ""
 
@@ -76,6 +78,18 @@ C = Language(
 
 static inline double next_after(double t) {
     return nextafter(t, INFINITY);
+}
+""",
+    random="""static inline double uniform(double seed, double stream, double number, double draw) {
+    const double given[4] = {seed, stream, number, draw};
+    uint64_t state = 0;
+    for (int i = 0; i < 4; i++) {
+        state = (state ^ (uint64_t)given[i]) + UINT64_C(0x9E3779B97F4A7C15);
+        state = (state ^ (state >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+        state = (state ^ (state >> 27)) * UINT64_C(0x94D049BB133111EB);
+        state ^= state >> 31;
+    }
+    return (double)(state >> 11) * 0x1p-53;
 }
 """,
     words=BRACES,
@@ -115,6 +129,18 @@ JAVASCRIPT = Language(
 })();
 // The room of a function's last call, if that had as many numbers.
 const roomFor = (room, Numbers, n) => (room?.length === n ? room : new Numbers(n));
+""",
+    random="""const uniform = (...given) => {
+    let state = 0n;
+    const wrapped = (x) => BigInt.asUintN(64, x);
+    for (const number of given) {
+        state = wrapped((state ^ BigInt(number)) + 0x9E3779B97F4A7C15n);
+        state = wrapped((state ^ (state >> 30n)) * 0xBF58476D1CE4E5B9n);
+        state = wrapped((state ^ (state >> 27n)) * 0x94D049BB133111EBn);
+        state ^= state >> 31n;
+    }
+    return Number(state >> 11n) * 2 ** -53;
+};
 """,
     words=BRACES,
 )  # fmt: skip

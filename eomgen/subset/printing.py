@@ -21,7 +21,8 @@ def printed(text: Text, roots: Roots, language: Language) -> str:
     lines = list(_structures(text, functions.values(), language)) if language.typed else []
     for name, function in functions.items():
         lines += ["", *function.lines(name)]
-    return "\n".join(lines).lstrip("\n") + "\n"
+    source = "\n".join(lines).lstrip("\n") + "\n"
+    return language.random + source if "uniform(" in source else source
 
 
 def functions_of_text(

@@ -36,7 +36,7 @@ LEVELS = {"and": DECIDED, "or": DECIDED, "+": 3, "-": 3, "*": 4, "/": 4}
 """How closely operators bind, others as comparisons do: what is looser than its place needs
 parentheses.
 """
-FUNCTIONS = {"abs", "isfinite", "next_after", *OF_NUMBERS}
+FUNCTIONS = {"abs", "isfinite", "next_after", "uniform", *OF_NUMBERS}
 """Those of numbers."""
 ZERO = {"zeros": 0.0, "numbers": 0.0, "counts": 0}
 """What new arrays have."""

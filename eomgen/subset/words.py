@@ -38,8 +38,8 @@ from numpy.typing import NDArray
 __all__ = [
     "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
     "counts", "exp", "in_loops", "inf", "isfinite", "larger", "log", "nan", "next_after",
-    "numbers", "ordered", "product", "rows", "sqrt", "transposed", "unrolled", "with_arrays",
-    "with_lists", "zeros",
+    "numbers", "ordered", "product", "rows", "sqrt", "transposed", "uniform", "unrolled",
+    "with_arrays", "with_lists", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -144,6 +144,19 @@ def transposed(x: Matrix) -> Matrix:
 def next_after(t: float) -> float:
     """The next number above t."""
     return math.nextafter(t, inf)
+
+
+def uniform(seed: float, stream: float, number: float, attempt: float) -> float:
+    """A number from 0 to 1 without 1, of 53 random bits that follow from four whole numbers below
+    2^53: S. Vigna's splitmix64, whose state takes one of them before each of four steps.
+    """
+    state = 0
+    for given in (seed, stream, number, attempt):
+        state = ((state ^ int(given)) + 0x9E3779B97F4A7C15) % 2**64
+        state = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) % 2**64
+        state = ((state ^ (state >> 27)) * 0x94D049BB133111EB) % 2**64
+        state ^= state >> 31
+    return float((state >> 11) * 2.0**-53)
 
 
 def unrolled(values: Sequence[T]) -> Sequence[T]:

@@ -21,6 +21,7 @@ from eomgen.scene.reader import parse_scene
 CRANE = """\
 name = "crane"
 dimensions = {dimensions}
+inputs = ["wish"]
 [parameters]
 stiff = -4.0
 [[bodies]]
@@ -87,6 +88,9 @@ TABLES: dict[str, dict[str, str]] = {
     "pid": {"joint": '"rail"', "target": "1", "target_rate": "1", "stiffness": "1", "damping": "1",
             "limit": "1", "lag": "1", "integral_gain": "1", "tracking": "1"},
     "controller": {"torques": '{{ hinge = "z" }}', "states": '{{ z = {{ rate = "swing" }} }}'},
+    "sampled_controller": {"period": "0.1", "inputs": '{{ wish = "z" }}', "seed": "1",
+                           "torques": '{{ hinge = "z" }}', "states": '{{ z = {{ next = "s" }} }}',
+                           "sensors": '{{ s = {{ value = "swing", noise = 1, quantum = 1 }} }}'},
 }  # fmt: skip
 """Of every effect good tables, which together give every field that holds a quantity or a name."""
 OF_ANY_SIGN = set(
@@ -95,7 +99,8 @@ OF_ANY_SIGN = set(
     "external_force.force external_torque.torque field.at field.center field.force gravity.g "
     "joint_spring.law joint_spring.rest joint_stop.high joint_stop.low joint_stop.restitution "
     "motor.torque pairwise.law pd.target pd.target_rate pid.target pid.target_rate "
-    "point_gravity.at spring.at_1 spring.at_2 spring.law spring.rest_length".split()
+    "point_gravity.at sampled_controller.inputs sampled_controller.torques spring.at_1 "
+    "spring.at_2 spring.law spring.rest_length".split()
 )
 """Forces, places, laws and targets; a restitution has two bounds, and tests of its own. All else,
 stiffness, damping, drag, gains, is not negative.
@@ -133,10 +138,11 @@ def quantities(kind: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:
     effect = elaborate(parse_scene(crane(kind))).effects[0]
     for field, info in member.model_fields.items():
         extra = info.json_schema_extra
-        if field in TABLES[kind] and isinstance(extra, dict) and "unit" in extra:
+        key = info.alias or field
+        if key in TABLES[kind] and isinstance(extra, dict) and "unit" in extra:
             turning, *sliding = extra["unit"].split(" | ")
             unit = sliding[-1] if sliding and "rail" in TABLES[kind].get("joint", "") else turning
-            yield field, getattr(effect, field), {**extra, "unit": unit}
+            yield key, getattr(effect, field), {**extra, "unit": unit}
 
 
 def test_all_effects_are_here() -> None:
@@ -148,8 +154,9 @@ def test_all_effects_are_here() -> None:
         for field, info in member.model_fields.items():
             extra = info.json_schema_extra
             if isinstance(extra, dict) and "unit" in extra:
-                assert field in given, f"{kind}.{field}"
-                free |= {f"{kind}.{field}"} if extra["bound"] == "any" else set()
+                key = info.alias or field
+                assert key in given, f"{kind}.{key}"
+                free |= {f"{kind}.{key}"} if extra["bound"] == "any" else set()
     assert free == OF_ANY_SIGN
     for kind in TABLES:
         for dimensions in (2, 3):

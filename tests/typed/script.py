@@ -4,6 +4,7 @@ It is also run, by tests/project/test_package.py, so that what it annotates is w
 """
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,11 @@ def push(t: float) -> float:
 def late(t: float, y: Floats) -> bool:
     """Whether a run has gone on for long enough."""
     return t > 0.2 and bool(np.isfinite(y).all())
+
+
+def brake(t: float, sensed: Mapping[str, float], state: Mapping[str, object]) -> dict[str, float]:
+    """A controller that samples."""
+    return {"push": -2.0 * sensed["v"]}
 
 
 def of_scenes() -> None:
@@ -66,6 +72,9 @@ def of_runs(folder: Path) -> None:
         follow=late,
     )
     pushed: eomgen.Run = eomgen.simulate("cart_pole", t_end=0.1, inputs={"push": push})
+    held = eomgen.Controller(function=brake, period=0.02, inputs=["push"], sensors={"v": "x_dot"})
+    braked: eomgen.Run = eomgen.simulate("cart_pole", t_end=0.1, controllers=[held])
+    print(braked.finished)
     angle: Floats = run["theta"]
     energy: Floats = run.energy
     error: float = run.error

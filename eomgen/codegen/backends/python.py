@@ -95,7 +95,7 @@ def module(program: Program, interface: Interface) -> str:
     dynamics = [(n, OUTPUTS[n].beside, "=None" * (OUTPUTS[n].beside == "tau")) for n in DYNAMICS]
     matrices = [k.function.name for k in kernels if k.function.matrix]
     special = {"initial_state", "derivative", *matrices, *(name for name, _, _ in dynamics)}
-    special |= {"impact", "held"}
+    special |= {"impact", "held", "samples"}
     context = _facts(interface) | {
         "about": document(interface, costs["derivative"]),
         "parameter_names": ", ".join(constants.parameters),
@@ -103,6 +103,7 @@ def module(program: Program, interface: Interface) -> str:
         "tests": [(_test(test), _words(test)) for test in refused.tests],
         "impact": written.get("impact"),
         "held": written.get("held"),
+        "samples": written.get("samples"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
         "kernels": list(written.values()),
         "math_functions": sorted({*SHELL, *(f for f in called if hasattr(math, f))}),
@@ -151,6 +152,8 @@ def _facts(interface: Interface) -> dict[str, Any]:
         "driven": repr(tuple(c.name for c in interface.driven)) if interface.driven else "",
         "points": repr(interface.points),
         "contacts": [(c.name, c.effect) for c in interface.contacts],
+        "controllers": [(c.effect, c) for c in interface.sampling],
+        "noises": sum(len(c.noises) for c in interface.sampling),
         "constraints": repr(tuple(n for n, _ in interface.constraints)),
         "constrained": bool(interface.constraints),
         "velocity_rows": repr(interface.velocity_rows) if interface.velocity_rows else "",

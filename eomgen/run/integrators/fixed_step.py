@@ -41,12 +41,16 @@ def count_steps(span: float, dt: float) -> float:
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps end at t_start + i dt, and at `t_end`; every `every`-th is a row, and the last."""
+    """Steps end at t_start + i dt, and at `t_end`; every `every`-th is a row, and the last if it
+    `ends` the run. There are steps `before` these.
+    """
 
     t_start: float
     t_end: float
     dt: float
     every: int
+    before: int = 0
+    ends: bool = True
 
     @cached_property
     def steps(self) -> int:
@@ -55,7 +59,11 @@ class Grid:
 
     def is_row(self, i: int, t: float) -> bool:
         """Whether step i ends at t, and is a row."""
-        return self.end(i)[0] == t and (i % self.every == 0 or i == self.steps)
+        return self.end(i)[0] == t and self.is_kept(i)
+
+    def is_kept(self, i: int) -> bool:
+        """Whether step i is a row."""
+        return (self.before + i) % self.every == 0 or (self.ends and i == self.steps)
 
     def end(self, i: int) -> tuple[float, float | None]:
         """When step i ends, from 1 on, and when it does by the grid; None if it is shorter."""
@@ -187,7 +195,9 @@ def _rows(kept: Kept, many: tuple[int, int], made: int, grid: Grid) -> tuple[Any
     """
     every, (n, last) = grid.every, many
     if made + n == grid.steps:  # the last one, alone
+        last *= grid.is_kept(grid.steps)
         return [(grid.t_end, kept.states[0])][:last], [last]
+    made += grid.before
     hit = slice(-(made + 1) % every, last, every)
     if n <= AHEAD:
         rows = list(zip(kept.ends[hit].tolist(), kept.states[hit].copy(), strict=True))

@@ -20,6 +20,7 @@ from eomgen.scene.effects.motor import Motor
 from eomgen.scene.effects.pairwise import Pairwise
 from eomgen.scene.effects.pd import Pd
 from eomgen.scene.effects.pid import Pid
+from eomgen.scene.effects.sampled_controller import SampledController
 from eomgen.scene.effects.spring import Spring
 
 Effect = Annotated[
@@ -39,6 +40,7 @@ Effect = Annotated[
     | Pd
     | Pid
     | PointGravity
+    | SampledController
     | Spring,
     Field(discriminator="type"),
 ]
@@ -62,5 +64,6 @@ __all__ = [
     "Pd",
     "Pid",
     "PointGravity",
+    "SampledController",
     "Spring",
 ]

@@ -1,7 +1,9 @@
 """The interface of effects: the `Mechanism` that they read and the loads that they return."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
@@ -41,6 +43,41 @@ class ExtraState:
     unit: str
     about: str
     initial: float
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """When an effect samples, and which states that sets.
+
+    period, delay  of its samples, and from one to the change of what it holds, s
+    noisy          names of sensors whose noise a sample needs
+    sets           states that a sample sets at once
+    holds          states that it sets after the delay, those after `sets`
+    inputs         inputs of the scene that are among these
+    seed           whole number from which noise follows
+    """
+
+    period: float
+    delay: float
+    noisy: tuple[str, ...]
+    sets: tuple[str, ...]
+    holds: tuple[str, ...]
+    inputs: tuple[str, ...]
+    seed: Formula
+
+    @property
+    def due(self) -> dict[str, tuple[str, ...]]:
+        """For what is held the states with its next values, in the order in which they are due."""
+        waiting = math.ceil(simplest(self.delay) / simplest(self.period))
+        return {name: tuple(f"{name}_due_{i + 1}" for i in range(waiting)) for name in self.holds}
+
+
+def simplest(x: float) -> Fraction:
+    """The simplest fraction that rounds to a number: 1/100 for 0.01."""
+    bound = 1
+    while float(found := Fraction(x).limit_denominator(bound)) != x:
+        bound *= 10
+    return found
 
 
 @dataclass(frozen=True)
@@ -258,6 +295,14 @@ class EffectTable(Table):
 
     def loads(self, mechanism: Mechanism) -> Iterable[Load | JointLoad]:
         """Its loads on bodies and joints."""
+        return ()
+
+    def sampling(self) -> Sampling | None:
+        """When it samples; None if it does not."""
+        return None
+
+    def samples(self, mechanism: Mechanism, noise: Mapping[str, Scalar]) -> Sequence[Scalar]:
+        """What a sample gives `Sampling.sets` and `holds`, with a normal number for each noise."""
         return ()
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
