@@ -12,6 +12,8 @@ from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.results.simulated import Simulated
 from eomgen.run.module import load_module
+from eomgen.scene.effects.elements import AtJoint
+from eomgen.scene.look import number
 from eomgen.show.drawing_data import drawing_data
 from eomgen.show.live import live_table, set_by_hand, velocity_rows
 from eomgen.show.motion import Array, Motion
@@ -40,7 +42,7 @@ def page_code(run: Simulated, motion: Motion, *, live: bool | None = None) -> Pa
     geometry = drawing_data(motion)[1]
     series = run.simulation.integrator == "taylor"
     found, why = _live(run.model, geometry, live, series)
-    code = _recorded(run, why) if found is None else _going_on(run, found)
+    code = _recorded(run, why) if found is None else _going_on(run, motion, found)
     return replace(code, smooth=not run.varying, events=events)
 
 
@@ -62,7 +64,18 @@ def _live(
     return None, f"its functions would take {len(code.source) / 1e6:.1f} MB"
 
 
-def _going_on(run: Simulated, code: LiveCode) -> PageCode:
+def _limits(model: Model, motion: Motion) -> dict[str, list[float | None]]:
+    """The lower and the upper limit of coordinates that have stops, at the scene's parameters."""
+    found = {}
+    for stop in motion.drawn.elements if motion.drawn else ():
+        if isinstance(stop, AtJoint) and stop.kind == "stop":
+            coordinate = model.bodies[stop.joint].positions[stop.coordinate]
+            ends = (stop.low, stop.high)
+            found[coordinate.name] = [None if end is None else number(end) for end in ends]
+    return found
+
+
+def _going_on(run: Simulated, motion: Motion, code: LiveCode) -> PageCode:
     """A mechanism that goes on from a run."""
     t, steps = run.trajectory.t, run.trajectory.counts["steps"]
     table = live_table(
@@ -72,6 +85,7 @@ def _going_on(run: Simulated, code: LiveCode) -> PageCode:
         inputs=run.inputs,
         mean_step=float(t[-1] - t[0]) / steps if steps else None,
     )
+    table["limits"] = _limits(run.model, motion)
     rows = _all_coordinates(run) if run.model.form == "velocity" else _velocity_rows(run)
     return PageCode(code.source, table, live=True, y=rows)
 

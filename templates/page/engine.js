@@ -284,11 +284,18 @@ const makeEngine = (mechanism, data) => {
   engine.lead = (y, k, value) => {
     const velocities = Array.from(others).filter((i) => kinds[i] === "velocity");
     const place = quaternions.length ? -1 : positions.indexOf(k);
+    const speeds = velocities.map((i) => y[i]);
+    if (held && kinds[k] === "velocity") {
+      velocities.forEach((i) => (y[i] = Number(i === k)));
+      projected(engine.t, y);
+      const factor = (value - speeds[velocities.indexOf(k)]) / y[k];
+      velocities.forEach((i, j) => (y[i] = speeds[j] + (Number.isFinite(factor) ? factor * y[i] : 0)));
+      return;
+    }
     if (!held || place < 0) {
       y[k] = value;
       return;
     }
-    const speeds = velocities.map((i) => y[i]);
     for (let count = 0; count < MOST_LED; count += 1) {
       velocities.forEach((i, j) => (y[i] = Number(j === place)));
       projected(engine.t, y);

@@ -37,7 +37,7 @@ const makeEquations = (terms, onLight) => {
     const cells = [];
     let scale = 0;
     list.append(root);
-    return (state, rates) => {
+    return (state, rates, playing) => {
       const found = terms.at(i, state, rates);
       if (!cells.length) {
         const first = found.findIndex(({ kind }) => kind !== "inertia");
@@ -46,7 +46,7 @@ const makeEquations = (terms, onLight) => {
         light(lit);
       }
       const most = Math.max(...found.map(({ value }) => Math.abs(value)).filter(Number.isFinite), 0);
-      scale = Math.max(0.9 * scale, most);
+      scale = playing ? Math.max(0.95 * scale, most) : most; // bars that jump could not be read
       let before = false; // whether a term of this side is shown
       found.forEach(({ kind, value, j }, k) => {
         const { whole, value: cell, bar } = cells[k];
@@ -93,7 +93,7 @@ const makeEquations = (terms, onLight) => {
       if (!panel.open || (playing && now - written < PAUSE)) return;
       written = now;
       const rates = ratesOf();
-      for (const write of rows) write(state, rates);
+      for (const write of rows) write(state, rates, playing);
       byId("equations-note").hidden = Boolean(rates);
     },
   };

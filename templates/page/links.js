@@ -9,17 +9,19 @@ const links = (() => {
   const numbersIn = (given) => new Map(Object.entries(given ?? {}).filter(([, x]) => Number.isFinite(x)));
   const isText = (x) => typeof x === "string";
 
-  // What an address says of {parameters, inputs, state}, each numbers by name, of t, method, dt, and plots {x, y}; null if it
-  // says nothing.
+  const setupIn = ({ parameters, inputs, state, method, dt }) => ({
+    parameters: numbersIn(parameters), inputs: numbersIn(inputs), state: numbersIn(state),
+    method: isText(method) ? method : "", dt: dt > 0 && dt < Infinity ? dt : undefined,
+  });
+
+  // What an address says of {parameters, inputs, state}, each numbers by name, of t, method, dt, and plots {x, y}; `kept` is
+  // the same of a second run, or null. Null if it says nothing.
   function read(hash) {
     if (!hash.startsWith(MARK)) return null;
     try {
-      const { parameters, inputs, state, t, method, dt, plots } = JSON.parse(decodeURIComponent(hash.slice(MARK.length)));
+      const { t, plots, kept, ...setup } = JSON.parse(decodeURIComponent(hash.slice(MARK.length)));
       const shown = (Array.isArray(plots) ? plots : []).filter(({ x, y }) => (x === null || isText(x)) && Array.isArray(y) && y.every(isText));
-      return {
-        parameters: numbersIn(parameters), inputs: numbersIn(inputs), state: numbersIn(state),
-        t: Number.isFinite(t) ? t : 0, method: isText(method) ? method : "", dt: dt > 0 ? dt : undefined, plots: shown,
-      };
+      return { ...setupIn(setup), t: Number.isFinite(t) ? t : 0, plots: shown, kept: kept && typeof kept === "object" ? setupIn(kept) : null };
     } catch {
       return null;
     }

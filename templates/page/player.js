@@ -21,7 +21,9 @@ const player = (() => {
   const canvas = byId("stage");
   const stage = makeStage(canvas, mechanism);
   const replay = makeReplay(mechanism);
-  const values = makeValues((index, value) => begin((y) => engine.lead(y, index, value)));
+  // Go on from where a state has a value.
+  const place = (index, value) => begin((y) => engine.lead(y, index, value));
+  const values = makeValues(place);
   const slider = byId("time");
   const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
   const clock = {
@@ -36,6 +38,7 @@ const player = (() => {
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
+  const poses = engine && makePoses(mechanism, place);
   const equations = makeEquations(makeTerms(mechanism, DATA), light);
 
   // ---- What is shown: a time, a state, parameters and inputs ----
@@ -44,6 +47,29 @@ const player = (() => {
     if (clock.seen) return clock.seen;
     if (isLive()) return { t: engine.t, y: engine.y, p: engine.p, u: engine.u };
     return { t: clock.time, y: replay.stateAt(clock.time), p: replay.p, u: replay.u };
+  }
+
+  // How far the kept run is from a state; nothing for null.
+  function tellDifference(state) {
+    const line = byId("difference");
+    line.hidden = !state;
+    if (!state) return;
+    const { energy, body, distance, scale } = comparison.difference(state);
+    line.textContent = `B (${comparison.told(engine)}): energy ${numbers.text(energy, "J", scale)} more, ${body} ${numbers.text(distance, "m", DATA.size)} away`;
+  }
+
+  // Keep the present run as B, which goes on beside; or drop it.
+  function keep() {
+    if (comparison.engine) comparison.drop();
+    else comparison.keep(engine, engine.y, engine.t);
+    showKept();
+  }
+  function showKept() {
+    const isOn = Boolean(comparison.engine);
+    byId("keep").setAttribute("aria-pressed", String(isOn));
+    byId("keep").textContent = isOn ? "Drop B" : "Keep as B";
+    plotting.compare(isOn ? comparison.samples : null);
+    redraw();
   }
 
   // The time derivative of a state that is shown; null where the force of a held contact, which it contains, is not known.
@@ -71,7 +97,9 @@ const player = (() => {
       const state = current();
       const grip = isLive() && engine.grip;
       const pull = grip && grip.point ? [grip.point, grip.target] : null;
-      stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
+      const other = isLive() ? comparison.given(state.t) : null;
+      stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive(), other });
+      tellDifference(other && state);
       values.show({
         ...state,
         energy: energyOf(state),
@@ -79,6 +107,7 @@ const player = (() => {
         stepCost: isLive() ? engine.cost() : NaN,
         single: !isLive() && DATA.run.single,
       });
+      poses?.show(state.y, clock.playing);
       equations?.show(state, () => ratesOf(state), clock.playing);
       overlay.draw(state.t);
       plotting.cursor(state.t);
@@ -130,8 +159,10 @@ const player = (() => {
   }
 
   function advance(seconds, budget) {
-    engine.advance(seconds, Math.min(budget, 1000 * LONGEST));
-    byId("behind").hidden = !engine.behind;
+    const most = Math.min(budget, 1000 * LONGEST) / (comparison.engine ? 2 : 1);
+    const isLate = !comparison.follow(engine.t, most);
+    if (!isLate) engine.advance(seconds, most);
+    byId("behind").hidden = !(engine.behind || isLate);
     afterSteps();
   }
 
@@ -151,6 +182,7 @@ const player = (() => {
     if (playing && !isLive() && clock.time >= replay.end) clock.time = replay.begin;
     const starts = playing && !clock.playing;
     if (playing) clock.seen = null;
+    else byId("behind").hidden = true;
     clock.playing = playing;
     clock.stamp = performance.now();
     byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
@@ -181,6 +213,7 @@ const player = (() => {
     else if (direction > 0) {
       clock.seen = null;
       engine.step();
+      comparison.follow(engine.t, Infinity);
       afterSteps();
     }
     redraw();
@@ -192,13 +225,20 @@ const player = (() => {
       return;
     }
     engine.reset();
+    comparison.restart();
     afterSteps();
     clock.seen = null;
     say("");
     values.restart();
-    stage.clearTraces();
     stage.fit();
+    restartPlots();
+  }
+
+  // Traces and plots from the present state on.
+  function restartPlots() {
+    stage.clearTraces();
     plotting.restart();
+    engine.onSample?.(engine.t, engine.y);
     redraw();
   }
 
@@ -255,9 +295,7 @@ const player = (() => {
     engine.reset(y, t ?? now.t, true);
     say(engine.error ?? "");
     values.restart();
-    stage.clearTraces();
-    plotting.restart();
-    redraw();
+    restartPlots();
   }
 
   const panels = makePanels({
@@ -308,7 +346,8 @@ const player = (() => {
   // ---- Wiring ----
 
   const overlay = makeOverlay(stage, show);
-  const plotting = makePlotting({ mechanism, replay, seek });
+  const plotting = makePlotting({ mechanism, replay, seek, put: engine && place });
+  const comparison = makeComparison(mechanism, DATA, plotting.channels);
 
   for (const [key, text, on] of SHOWS) {
     if (offered[key] === false) continue;
@@ -342,7 +381,7 @@ const player = (() => {
     redraw();
   };
   const actions = {
-    play: () => setPlaying(!clock.playing), back: () => step(-1), forth: () => step(1), restart: reset,
+    keep, play: () => setPlaying(!clock.playing), back: () => step(-1), forth: () => step(1), restart: reset,
     closer: () => zoom(1.25), farther: () => zoom(0.8), fit: view(stage.fit),
     "save-svg": () => downloads.saveText(`${downloads.fileName(DATA.name)}.svg`, stage.toSvg(), "image/svg+xml"),
     "mode-replay": () => setMode("replay"), "mode-live": () => { if (!isLive()) { setMode("live"); setPlaying(true); } },
@@ -353,54 +392,12 @@ const player = (() => {
     slider.min = replay.begin;
     slider.max = replay.end;
   }
+  byId("keep").hidden = !DATA.live;
   byId("save-svg").hidden = Boolean(stage.failed);
   listenToPrinting(stage, plotting.plots);
   listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
   byId("modes").hidden = !DATA.live || !replay;
-  // The address of the page as it is now.
-  function address() {
-    const { t, y, p, u } = current();
-    const setup = {
-      parameters: links.changed(DATA.parameters, p), inputs: links.changed(DATA.inputs, u), state: links.changed(DATA.states, y),
-      t, method: engine.method, dt: engine.dt, plots: plotting.plots.specs(),
-    };
-    return links.write(setup);
-  }
-
-  // The page as an address says. Returns whether it says anything.
-  function open(hash) {
-    const given = DATA.live && links.read(hash);
-    if (!given) return false;
-    setMode("live");
-    given.parameters.forEach((x, name) => panels.setParameter(name, x));
-    given.inputs.forEach((x, name) => panels.setInput(name, x));
-    if (given.method) engine.setMethod(engine.methods.some(({ name }) => name === given.method) ? given.method : engine.method, given.dt);
-    panels.showMethods(engine);
-    begin((y) => DATA.states.forEach(({ name }, k) => {
-      y[k] = given.state.get(name) ?? y[k];
-    }), given.t);
-    if (given.plots.length) plotting.restore(given.plots);
-    return true;
-  }
-  if (DATA.live) {
-    const link = byId("link");
-    link.addEventListener("click", async () => {
-      const { href } = new URL(address(), location.href);
-      let told = "A frame has no address";
-      try {
-        history.replaceState(null, "", href);
-        told = "It is in the address bar";
-        await navigator.clipboard.writeText(href);
-        told = "Copied";
-      } catch {
-        // not allowed here
-      }
-      link.textContent = told;
-      setTimeout(() => {
-        link.textContent = "Copy link";
-      }, 2000);
-    });
-  }
+  const sharing = DATA.live ? makeSharing({ engine, panels, plotting, comparison, current, begin, setMode, showKept }) : null;
   say("");
   let warmed = 0;
   // While the run is replayed, the browser compiles the functions for the live motion.
@@ -424,8 +421,8 @@ const player = (() => {
   }
   setMode(clock.mode);
   new ResizeObserver(redraw).observe(canvas);
-  if (!open(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
-  return { stage, clock, current, goTo, plotting, engine, show };
+  if (!sharing?.open(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
+  return { stage, clock, current, goTo, plotting, engine, show, comparison };
 })();
 
 // What tests and curious people may read of the page.
@@ -439,6 +436,11 @@ window.eomgen = Object.freeze({
   get lit() { return player.show.lit ?? null; }, // the effect whose arrows and terms are marked
   get error() { return player.engine?.error ?? null; },
   get step() { return player.engine ? { method: player.engine.method, seconds: player.engine.dt, ms: player.engine.cost() } : null; },
+  // The second run, which is kept beside, at the time that is shown.
+  get kept() {
+    const { engine, given } = player.comparison;
+    return engine ? { method: engine.method, parameters: Array.from(engine.p), state: Array.from(given(player.current().t)[1]) } : null;
+  },
   // World positions of the centres of mass, m, and where they are in the picture, CSS pixels.
   get centers() { return DATA.bodies.map((_, k) => tools.center(player.stage.poses(), k).slice(0, DATA.dimensions)); },
   get screen() { return DATA.bodies.map((_, k) => player.stage.toScreen(tools.center(player.stage.poses(), k))); },

@@ -1,7 +1,8 @@
 // `makePlots` fills an element with plots of channels against time or against one another, in step
-// with the picture. Options: onSeek(t) moves the picture; name is the start of names of files.
+// with the picture. Options: onSeek(t) moves the picture; onPut(k, value) gives
+// state k a value, if a motion can go on from there; name is the start of names of files.
 
-const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {}) => {
+const makePlots = (container, channels, { onSeek = () => {}, onPut = null, name = "plot" } = {}) => {
   const MOST_SAMPLES = 6000; // of a live run within the time shown
   const SPANS = [2, 5, 10, 30, 60]; // seconds of a live run that are shown
   const CURVES = 8; // colours; more curves are dashed
@@ -11,7 +12,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   const LEAST_PAUSE = 50; // ms between two drawings of a live run
 
   const samples = makeSamples(channels);
-  const state = { live: false, span: SPANS[2], view: null, mark: 0, hover: null };
+  const state = { kept: null, live: false, span: SPANS[2], view: null, mark: 0, hover: null };
   const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0, timer: 0 };
   let plots = [];
   let colors = new Map();
@@ -65,8 +66,10 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   // ---- Time ----
 
   function setMemory() {
-    samples.span = state.live ? state.span : Infinity;
-    samples.spacing = state.live ? state.span / MOST_SAMPLES : 0;
+    for (const each of [samples, ...(state.kept ? [state.kept] : [])]) {
+      each.span = state.live ? state.span : Infinity;
+      each.spacing = state.live ? state.span / MOST_SAMPLES : 0;
+    }
   }
   function bounds() {
     const t = samples.times();
@@ -76,6 +79,12 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     return [low, Math.max(last, low + state.span)];
   }
   const view = () => state.view ?? bounds();
+  function setLive(live) {
+    const other = state.kept && state.live !== live;
+    state.live = live;
+    setMemory();
+    if (other) for (const plot of plots) build(plot); // with or without the curves of the kept run
+  }
 
   function look(next) {
     if (next) {
@@ -111,6 +120,9 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   const place = (plot) => ({
     box: plot.box,
     samples,
+    kept: state.live ? state.kept : null,
+    put: (x, y) => [[plot.spec.x, x], [plot.spec.y[0], y]].forEach(([key, value]) => onPut(channels.states.indexOf(key), value)),
+    isPutting: () => plot.putting,
     spec: plot.spec,
     channel: channels.get,
     color: (key) => paint(colorName(plot, key)),
@@ -135,12 +147,19 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     return units.size <= (plot.spec.x ? 1 : 2);
   }
 
+  function setPutting(plot, putting) {
+    plot.putting = putting;
+    plot.putter.setAttribute("aria-pressed", String(putting));
+  }
+
   function addPlot({ x = null, y }) {
     const plot = { spec: { x, y: [] }, slots: new Map(), chart: null, readers: [] };
     plot.root = make("section", "plot");
     plot.curves = plot.root.appendChild(make("ul", "plot-curves"));
     const tools = make("div", "plot-tools");
+    plot.putter = button("Set state", "Click or drag a point, or press arrow keys, to go on from there", () => setPutting(plot, !plot.putting), "small bare");
     tools.append(
+      plot.putter,
       button("Curves", "Add or remove curves", () => choose(plot), "small bare"),
       button("x axis", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
       button("PNG", "Save this plot as a picture", () => savePicture(plot), "small bare"),
@@ -213,7 +232,12 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     return svg;
   }
 
+  // Whether a plot is the phase plane of a coordinate.
+  const isPlane = ({ x, y }) => channels.pairs.some(([position, rate]) => position === x && y.length === 1 && y[0] === rate);
+
   function build(plot) {
+    plot.putter.hidden = !onPut || !isPlane(plot.spec);
+    if (plot.putter.hidden) setPutting(plot, false);
     plot.chart?.destroy();
     plot.chart = null;
     plot.readers = [];
@@ -360,15 +384,13 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     samples,
     // A run that is known whole; see `samples.set`.
     setSource(t, y, p, u, held, single) {
-      state.live = false;
-      setMemory();
+      setLive(false);
       samples.set(t, y, p, u, held, single);
       api.showLive();
     },
     // A live run, whose samples come by `append`.
     live() {
-      state.live = true;
-      setMemory();
+      setLive(true);
       samples.clear();
       api.showLive();
     },
@@ -376,6 +398,12 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       spanField.hidden = !state.live;
       state.hover = null;
       look(null);
+    },
+    // Beside the curves those of another run, faint; null for none.
+    compare(other) {
+      state.kept = other;
+      setMemory();
+      for (const plot of plots) build(plot);
     },
     append(t, y, p, u, held) {
       if (samples.append(t, y, p, u, held)) change("data");

@@ -2,6 +2,8 @@
 // channel against another. What both need of the panel is in `place`:
 //   box      element to draw in, which takes the focus
 //   samples, spec {x, y: [keys]}, channel(key)
+//   kept     samples of another run, whose curves are faint, or null
+//   put(x, y), isPutting()   set the state to a place of a phase plane, and whether pointers and keys do so
 //   color(key), dash(key), paint(css)   colours as the page's theme has them
 //   view()   [from, to] of the time shown      mark()   time of the picture, s
 //   hover(time or null), seek(time), look([from, to] or null), step(n), end(direction)
@@ -13,6 +15,8 @@ const charts = (() => {
   const GRAB = 7; // CSS pixels around the time mark
   const NEAR = 10; // CSS pixels within which passes of an orbit are the same to a pointer
   const FONT = '12px system-ui, "Segoe UI", Roboto, "Liberation Sans", sans-serif';
+  const FAINT = 0.4; // of the curves of another run
+  const NUDGE = 0.02; // part of the range by which keys move a state
   const HEIGHT = { time: 168, phase: 260 };
 
   // Limits of an axis for values from `low` to `high`.
@@ -109,6 +113,7 @@ const charts = (() => {
     const units = [...new Set(spec.y.map((key) => place.channel(key).unit))];
     const scaleName = (key) => `y${units.indexOf(place.channel(key).unit)}`;
     const exponents = {};
+    const all = place.kept ? [...spec.y, ...spec.y] : spec.y;
     let chart = null;
     const keysOf = (name) => spec.y.filter((key) => scaleName(key) === name);
     const scales = { x: { time: false, range: () => place.view() } };
@@ -122,11 +127,12 @@ const charts = (() => {
         axis(place, "x", 2, exponents, "s"),
         ...units.map((_, i) => axis(place, `y${i}`, i ? 1 : 3, exponents)),
       ],
-      series: [{}, ...spec.y.map((key) => ({
+      series: [{}, ...all.map((key, k) => ({
         scale: scaleName(key),
         stroke: () => place.color(key),
         dash: place.dash(key),
         width: 1.6,
+        alpha: k < spec.y.length ? 1 : FAINT,
         points: { show: false },
       }))],
       cursor: {
@@ -143,7 +149,7 @@ const charts = (() => {
           () => chart?.mark(), // the size of the plot may be another one
         ],
       },
-    }, [[], ...spec.y.map(() => [])], box);
+    }, [[], ...all.map(() => [])], box);
     const mark = child(u.over, "plot-mark");
 
     const timeAt = (x) => {
@@ -158,7 +164,9 @@ const charts = (() => {
     chart = {
       ...common(u, box, "time"),
       refresh() {
-        u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
+        const times = samples.times();
+        const other = place.kept?.columnsAt(spec.y, times) ?? [];
+        u.setData([times, ...[...samples.columns(spec.y), ...other].map(withGaps)], true);
         chart.mark();
       },
       mark() {
@@ -201,25 +209,29 @@ const charts = (() => {
     const exponents = {};
     let chart = null;
     let [xs, ys] = [[], []];
+    let [keptX, keptY] = [[], []]; // of the kept run
     let zoom = null; // {x: [low, high], y: [low, high]}
     const scaleX = () => samples.scale(spec.x);
+    const EMPTY = [Infinity, -Infinity];
+    const widened = ([low, high], column) => {
+      const [a, b] = limits(column);
+      return [Math.min(low, a), Math.max(high, b)];
+    };
     const whole = () => ({
-      x: rangeOf(...limits(xs), scaleX()),
-      y: rangeOf(...ys.reduce(([low, high], column) => {
-        const [a, b] = limits(column);
-        return [Math.min(low, a), Math.max(high, b)];
-      }, [Infinity, -Infinity]), scaleOf(place, spec.y)),
+      x: rangeOf(...[xs, keptX].reduce(widened, EMPTY), scaleX()),
+      y: rangeOf(...[...ys, ...keptY].reduce(widened, EMPTY), scaleOf(place, spec.y)),
     });
     let shown = whole();
 
     function path(self, series) {
-      const column = ys[series - 1];
+      const own = series <= ys.length;
+      const [across, column] = own ? [xs, ys[series - 1]] : [keptX, keptY[series - 1 - ys.length]];
       const line = new Path2D();
       const { left, top, width, height } = self.bbox;
       const [kx, ky] = [width / (shown.x[1] - shown.x[0]), height / (shown.y[1] - shown.y[0])];
       let open = false;
       for (let i = 0; i < column.length; i += 1) {
-        const x = left + kx * (xs[i] - shown.x[0]);
+        const x = left + kx * (across[i] - shown.x[0]);
         const y = top + height - ky * (column[i] - shown.y[0]);
         if (!Number.isFinite(x + y)) open = false;
         else if (open) line.lineTo(x, y);
@@ -231,6 +243,7 @@ const charts = (() => {
       return { stroke: line, fill: null, clip: null, band: null, gaps: null, flags: 1 };
     }
 
+    const all = place.kept ? [...spec.y, ...spec.y] : spec.y;
     const unit = place.channel(spec.y[0]).unit;
     const nameOf = (key) => place.channel(key).label;
     const aboveAxis = () =>
@@ -243,11 +256,12 @@ const charts = (() => {
         { ...axis(place, "x", 2, exponents, place.channel(spec.x).unit), label: nameOf(spec.x), labelSize: 18, labelFont: FONT },
         axis(place, "y0", 3, exponents),
       ],
-      series: [{}, ...spec.y.map((key) => ({
+      series: [{}, ...all.map((key, k) => ({
         facets: [{ scale: "x", auto: true }, { scale: "y0", auto: true }],
         stroke: () => place.color(key),
         dash: place.dash(key),
         width: 1.4,
+        alpha: k < spec.y.length ? 1 : FAINT,
         paths: path,
       }))],
       cursor: { show: false },
@@ -257,7 +271,7 @@ const charts = (() => {
           () => chart?.mark(),
         ],
       },
-    }, [null, ...spec.y.map(() => [[], []])], box);
+    }, [null, ...all.map(() => [[], []])], box);
     const dots = spec.y.map((key) => ({ key, mark: child(u.over, "plot-dot"), hover: child(u.over, "plot-dot plot-dot-hover") }));
 
     const across = () => u.over.clientWidth / (shown.x[1] - shown.x[0]);
@@ -303,8 +317,9 @@ const charts = (() => {
       ...common(u, box, "phase"),
       refresh() {
         current();
+        if (place.kept) [keptX, ...keptY] = place.kept.columns([spec.x, ...spec.y]);
         shown = zoom ?? whole();
-        u.setData([null, ...ys.map((column) => [xs, column])], true);
+        u.setData([null, ...ys.map((column) => [xs, column]), ...keptY.map((column) => [keptX, column])], true);
         chart.mark();
       },
       mark: () => putDots("mark", place.mark()),
@@ -315,16 +330,34 @@ const charts = (() => {
       zoom = next;
       chart.refresh();
     }
+    // The state of a place. The axes stay as they are until the plot is reset.
+    function put(left, top) {
+      zoom ??= { x: [...shown.x], y: [...shown.y] };
+      place.put(...value(left, top));
+    }
     const seek = (left, top) => {
+      if (place.isPutting()) {
+        put(left, top);
+        return;
+      }
       const t = nearestTime(left, top);
       if (t !== null) place.seek(t);
     };
     plotGestures(u.over, box, {
-      isMark: (x, y) => !dots[0].mark.hidden && dots.some((_, k) => {
+      // By keys: by parts of the range, down if `dy` is positive.
+      nudge(dx, dy) {
+        if (!place.isPutting()) return false;
+        current();
+        const last = xs.length - 1;
+        const [left, top] = pixel(xs[last], ys[0][last]);
+        put(left + dx * NUDGE * u.over.clientWidth, top + dy * NUDGE * u.over.clientHeight);
+        return true;
+      },
+      isMark: (x, y) => place.isPutting() || (!dots[0].mark.hidden && dots.some((_, k) => {
         const [left, top] = pixel(samples.valueAt(xs, place.mark()), samples.valueAt(ys[k], place.mark()));
         return Math.hypot(x - left, y - top) <= GRAB;
-      }),
-      hover: (x, y) => place.hover(nearestTime(x, y)),
+      })),
+      hover: (x, y) => place.hover(place.isPutting() ? null : nearestTime(x, y)),
       leave: () => place.hover(null),
       seek,
       select(x0, y0, x1, y1, isFinal, finished = true) {

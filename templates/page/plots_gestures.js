@@ -5,6 +5,7 @@
 //   select(x0, y0, x1, y1, isFinal)  an area dragged over
 //   zoom(factor, x, y), pan(dx, dy), reset()
 //   step(n), end(direction)          by keys
+//   nudge(dx, dy)                    by arrow keys in place of these; whether it did so. A plot may lack it
 
 const plotGestures = (over, focusable, actions) => {
   const CLICK = 4; // CSS pixels that a click may move
@@ -84,10 +85,10 @@ const plotGestures = (over, focusable, actions) => {
 
   const middle = () => [over.clientWidth / 2, over.clientHeight / 2];
   const keys = {
-    ArrowLeft: (shift) => (shift ? actions.pan(40, 0) : actions.step(-1)),
-    ArrowRight: (shift) => (shift ? actions.pan(-40, 0) : actions.step(1)),
-    ArrowUp: (shift) => shift && actions.pan(0, 40),
-    ArrowDown: (shift) => shift && actions.pan(0, -40),
+    ArrowLeft: (shift) => (shift ? actions.pan(40, 0) : actions.nudge?.(-1, 0) || actions.step(-1)),
+    ArrowRight: (shift) => (shift ? actions.pan(-40, 0) : actions.nudge?.(1, 0) || actions.step(1)),
+    ArrowUp: (shift) => (shift ? actions.pan(0, 40) : actions.nudge?.(0, -1) ?? false),
+    ArrowDown: (shift) => (shift ? actions.pan(0, -40) : actions.nudge?.(0, 1) ?? false),
     Home: () => actions.end(-1),
     End: () => actions.end(1),
     "+": () => actions.zoom(1.25, ...middle()),

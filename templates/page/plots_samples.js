@@ -187,6 +187,20 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
     return values[low] + part * (values[low + 1] - values[low]);
   };
 
+  // Columns at other times, which ascend: linear between samples, nan before the first and after the last.
+  samples.columnsAt = (keys, wanted) => {
+    const t = samples.times();
+    return samples.columns(keys).map((values) => {
+      let low = 0;
+      return Float64Array.from(wanted, (time) => {
+        while (low + 1 < t.length && t[low + 1] <= time) low += 1;
+        if (!(time >= t[0]) || (low + 1 === t.length && time > t[low])) return NaN;
+        const part = low + 1 < t.length ? (time - t[low]) / (t[low + 1] - t[low]) : 0;
+        return part > 0 ? values[low] + part * (values[low + 1] - values[low]) : values[low];
+      });
+    });
+  };
+
   // The kept sample next to a time, as copies {t, y, p, u, held}; null if there is none.
   samples.rowAt = (time) => {
     const t = samples.times();

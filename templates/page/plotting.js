@@ -1,10 +1,10 @@
 // `makePlotting`: connects the plots and the recorder with the run that is replayed or with the live
 // motion. The plots' cursor moves the picture, and the picture the cursor.
 
-const makePlotting = ({ mechanism, replay, seek }) => {
+const makePlotting = ({ mechanism, replay, seek, put }) => {
   const { byId, element } = tools;
   const channels = makeChannels(DATA, mechanism);
-  const plots = makePlots(byId("plots"), channels, { onSeek: seek, name: DATA.name });
+  const plots = makePlots(byId("plots"), channels, { onSeek: seek, onPut: put, name: DATA.name });
   const recorder = makeRecorder(DATA, channels);
   if (replay && channels.mayHold) replay.held = channels.heldAt(replay.t, DATA.run.events);
   byId("plots-panel").hidden = false;
@@ -37,6 +37,7 @@ const makePlotting = ({ mechanism, replay, seek }) => {
     },
     cursor: (t) => plots.cursor(t),
     restart: () => plots.live(),
+    compare: (samples) => plots.compare(samples),
     // Plots of what is known here, as `plots.specs` told them.
     restore: (specs) => plots.show(specs
       .filter(({ x }) => x === null || channels.get(x))
@@ -45,6 +46,7 @@ const makePlotting = ({ mechanism, replay, seek }) => {
     repaint: () => plots.refresh(),
     rowAt: (t) => plots.rowAt(t),
     plots,
+    channels,
     recorder,
   };
 };

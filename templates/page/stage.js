@@ -45,6 +45,7 @@ const makeStage = (canvas, mechanism) => {
   const world = makeWorld(scene, mixed);
   const elements = makeElements(scene, mixed);
   const traces = makeTraces(scene, () => paper);
+  const ghosts = makeGhosts(scene, () => paper);
   const marks = makeMarks(scene, () => paper, mixed);
   const arrows = makeArrows(scene, mechanism);
   const shadow = new THREE.MeshBasicMaterial({ depthWrite: false });
@@ -61,7 +62,7 @@ const makeStage = (canvas, mechanism) => {
     scene.background = paper;
     shadow.color.copy(paper).multiplyScalar(dark ? 0.45 : 0.8); // darker on a dark floor too
     theme += 1;
-    for (const part of [world, elements, traces, marks]) part.paint();
+    for (const part of [world, ghosts, elements, traces, marks]) part.paint();
   };
 
   // ---- Bodies: rebuilt when a parameter changes their shapes ----
@@ -104,19 +105,14 @@ const makeStage = (canvas, mechanism) => {
         entry.built = state;
       }
       const { group, cast, index } = entry;
+      shapes.placeAt(group, poses, index);
       if (space) {
-        group.matrix.set(...poses.slice(12 * index, 12 * index + 12), 0, 0, 0, 1);
         const level = world.floorLevel();
         cast.visible = seen.shadows && view.axes()[2][2] > 0;
         // Straight down onto the floor.
         cast.matrix.set(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-6, level, 0, 0, 0, 1).multiply(group.matrix);
         cast.matrixWorldNeedsUpdate = true;
-      } else {
-        const [x, y, angle] = poses.slice(3 * index, 3 * index + 3);
-        const [c, s] = [Math.cos(angle), Math.sin(angle)];
-        group.matrix.set(c, -s, 0, x, s, c, 0, y, 0, 0, 1, 0, 0, 0, 0, 1);
       }
-      group.matrixWorldNeedsUpdate = true;
     }
   }
 
@@ -163,8 +159,8 @@ const makeStage = (canvas, mechanism) => {
 
   // Draw a state. `show` says what: traces, joints, centres, forces, torques, velocities, reactions,
   // shadows; `pull` is [point, target] in the world while a body is pulled. With `keep`, the view
-  // follows a mechanism that would leave the picture.
-  stage.draw = (t, y, p, u, show, { pull = null, keep = false } = {}) => {
+  // follows a mechanism that would leave the picture. `other` is the state of another run, which is faint.
+  stage.draw = (t, y, p, u, show, { pull = null, keep = false, other = null } = {}) => {
     now = look([t, y, p, u], show);
     if (!pull) view.aim(now.poses); // what the pointer pulls to stays under it
     resize();
@@ -176,6 +172,7 @@ const makeStage = (canvas, mechanism) => {
     now.pixel = 1 / view.scale();
     world.draw(view, size, now.poses, now.values, t, theme);
     placeBodies(now);
+    ghosts.draw(other && look(other));
     elements.draw(now);
     traces.draw(show, t);
     marks.draw(now, show);

@@ -171,6 +171,74 @@ def test_a_force_and_its_terms_light_each_other_up(browser: Any, tmp_path: Path)
         assert term.get_attribute("aria-pressed") == "true"
 
 
+STEPPED = "(n) => { for (let k = 0; k < n; k += 1) forth.click(); return eomgen.state; }"
+
+
+def test_a_kept_run_goes_on_beside(browser: Any, run: Run, tmp_path: Path) -> None:
+    """B is the motion that there would be without the change, and a link keeps both."""
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as found:
+        page = found.page
+        found.go_live()
+        alone = page.evaluate(STEPPED, 100)
+        page.click("#restart")
+        page.click("#keep")
+        page.locator("#parameters .field").first.fill("0.6")
+        page.locator("#parameters .field").first.press("Enter")
+        page.locator("#step-half").click()
+        found.pause()
+        page.evaluate(STEPPED, 200)
+        found.drawn()
+        assert found.kept["state"] == pytest.approx(alone, abs=1e-12)
+        assert np.abs(np.array(found.state) - alone).max() > 1e-3
+        told = page.locator("#difference").inner_text()
+        assert "m_1 = 1\u00a0kg" in told and "J more" in told and "m away" in told
+        page.click("#link")
+        page.wait_for_function("location.hash.startsWith('#live=')")
+        other = page.context.new_page()
+        other.goto("about:blank")
+        other.goto(page.url)
+        kept = other.evaluate("eomgen.kept")
+        assert kept["state"] == pytest.approx(alone, abs=1e-12)
+        assert kept["parameters"] == found.kept["parameters"] != found.parameters
+        other.close()
+        page.click("#keep")
+        found.drawn()
+        assert found.kept is None and page.locator("#difference").is_hidden()
+
+
+OPEN = "() => Math.max(...mechanism.constraintResiduals(eomgen.time, eomgen.state, eomgen.parameters, eomgen.inputs).map(Math.abs))"  # noqa: E501
+
+
+def test_a_state_is_set_in_the_phase_plane_and_by_sliders(browser: Any, tmp_path: Path) -> None:
+    """By pointer and keys; loops stay closed. One slider for the one freedom of a linkage."""
+    run = eomgen.simulate("four_bar", t_end=0.2, samples=11)
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as found:
+        page = found.page
+        page.get_by_text("+ Phase portrait").click()
+        plot = page.locator(".plot").last
+        plot.get_by_text("Set state").click()
+        start = np.array(found.state)
+        over = plot.locator(".u-over").bounding_box()
+        places = []
+        for x in (0.4, 0.6):
+            page.mouse.click(over["x"] + x * over["width"], over["y"] + 0.3 * over["height"])
+            places.append(found.state)
+            assert page.evaluate(OPEN) < 1e-9
+        assert found.mode == "live" and not found.playing
+        (angle, rate), further = np.array(places)[0, [0, 3]], np.array(places)[1, [0, 3]]
+        assert further[0] > angle and further[1] == pytest.approx(rate, rel=1e-9)
+        assert np.abs(np.array(places[0]) - start)[1:3].max() > 1e-3
+        page.keyboard.press("ArrowUp")
+        assert found.state[3] > rate and found.state[0] == pytest.approx(further[0], abs=1e-9)
+        (slider,) = page.locator("#poses input").all()
+        slider.evaluate("(e) => { e.value = 1.5; e.dispatchEvent(new Event('input')); }")
+        assert found.state[0] == pytest.approx(1.5, abs=1e-9) and page.evaluate(OPEN) < 1e-9
+        page.click("#play")
+        found.until("() => document.getElementById('poses').disabled")
+
+
 def test_a_state_is_typed_and_a_link_keeps_it(browser: Any, tmp_path: Path) -> None:
     """The motion stands there; a link opens the same state, parameters, effects, method and plots.
     What a link says of nothing that is known changes nothing.
