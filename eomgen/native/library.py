@@ -5,9 +5,6 @@ import hashlib
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError
 from eomgen.codegen.backends.c import MAIN
@@ -20,16 +17,6 @@ LARGE = 300_000
 """Characters of source above which the lower level is used: compilation takes long, and the
 higher one gains little.
 """
-_BYTES = ctypes.c_char * 0
-
-
-def address(array: NDArray[Any]) -> int:
-    """Where the numbers of a contiguous array begin, which must outlive what uses it. This is
-    `array.ctypes.data`, found in a quarter of the time.
-    """
-    if not array.flags.writeable:
-        return array.ctypes.data
-    return ctypes.addressof(_BYTES.from_buffer(array.data))
 
 
 def built(sources: Mapping[str, str]) -> ctypes.CDLL:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from eomgen.native.beside import BESIDE, function, reader_of
-from eomgen.native.library import address
 from eomgen.run.module import given_values
 from eomgen.run.problem import FloatArray
+from eomgen.subset.structures import address
 
 MOST_KNOWN = 64
 """Largest number of parameter sets whose constants are kept."""

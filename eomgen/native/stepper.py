@@ -22,7 +22,7 @@ from eomgen.native import contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
 from eomgen.native.compiler import NOT_JOINED, find_compiler
 from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
-from eomgen.native.library import address, compiled_library
+from eomgen.native.library import compiled_library
 from eomgen.native.mechanism import Given, Mechanism, mechanism
 from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.ordering import ordered
@@ -33,6 +33,7 @@ from eomgen.run.problem import USUAL_LENGTH, FloatArray
 from eomgen.run.projection import PROJECTS, Projection
 from eomgen.store import interfaced_program_of
 from eomgen.subset.languages import VECTORS, C
+from eomgen.subset.structures import address
 
 MAIN = "stepper.c"
 METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))
