@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from live import run_in_node
 
+from eomgen.engine.structures import filled, take
 from eomgen.native.library import compiled_library
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
-from eomgen.subset.structures import filled, take
 from eomgen.subset.text import Text, own_name
 
 BY_BITS = """

@@ -6,7 +6,7 @@ from typing import Any
 
 from eomgen.engine import elimination
 from eomgen.engine.elimination import Factors
-from eomgen.subset.structures import with_room
+from eomgen.engine.structures import with_room
 from eomgen.subset.words import Vector, in_loops
 
 FEW = 20

@@ -39,9 +39,9 @@ from eomgen.engine import (
 )
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import EQUAL, Root, Roots
+from eomgen.engine.structures import parts_of
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
-from eomgen.subset.structures import parts_of
 from eomgen.subset.text import Text, own_name
 from eomgen.subset.unrolled import unrolled_functions
 

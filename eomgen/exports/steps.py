@@ -20,6 +20,7 @@ from eomgen.engine.implicit import Stages
 from eomgen.engine.methods import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
+from eomgen.engine.structures import extent, parts_of
 from eomgen.engine.symmetric import Projected
 from eomgen.engine.taylor import HIGHEST, Terms
 from eomgen.model.clocks import check_no_samples
@@ -35,7 +36,6 @@ from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
 from eomgen.subset.languages import Language
-from eomgen.subset.structures import extent, parts_of
 from eomgen.subset.text import Text
 from eomgen.tables.integrators import INTEGRATORS as SPECS
 

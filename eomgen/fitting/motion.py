@@ -17,6 +17,7 @@ from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import Bounds, Progress
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.sampled import sampled
+from eomgen.engine.structures import filled
 from eomgen.fitting.sensitive import MEASURED, Entries, sensitive
 from eomgen.model.model import Model
 from eomgen.native.accelerator import AN_OPERATION, STARTING, pays
@@ -25,7 +26,6 @@ from eomgen.native.module import Kernels
 from eomgen.run.module import load_module
 from eomgen.run.problem import FloatArray
 from eomgen.store import bytecode_of, interfaced_program_of, kept_text, key_of, package_digest
-from eomgen.subset.structures import filled
 
 MAIN = "sampled.c"
 MOST, MORE = 100_000, 300

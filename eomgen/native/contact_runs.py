@@ -7,8 +7,8 @@ from typing import Any
 from eomgen.codegen.interface import Interface
 from eomgen.engine import contact_runs
 from eomgen.engine.contact_times import SHARE
+from eomgen.engine.structures import filled, take
 from eomgen.run.compiled import Touched
-from eomgen.subset.structures import filled, take
 
 ROOTS: list[tuple[str, Mapping[str, Any]]] = [("taken", {}), ("strike", {})]
 """What is called of the engine."""

@@ -13,13 +13,13 @@ import numpy as np
 from eomgen.codegen.interface import Interface
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.methods import EQUAL, Root
+from eomgen.engine.structures import filled, take
 from eomgen.engine.sums import Sum
 from eomgen.native import contact_runs
 from eomgen.native.mechanism import Mechanism
 from eomgen.run.compiled import Constrained, EqualSteps, Touched
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
-from eomgen.subset.structures import filled, take
 
 LEAPFROGS = {
     name: len(known["of"].parts) if known else 1

@@ -17,6 +17,7 @@ from eomgen.engine.elimination import Factors
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
+from eomgen.engine.structures import filled, with_room
 from eomgen.native import contact_runs, equal_steps, strides
 from eomgen.native.mechanism import KERNELS, Mechanism
 from eomgen.native.mechanism import context as of_mechanism
@@ -26,7 +27,6 @@ from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import between, rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.structures import filled, with_room
 
 MAIN = "implicit.c"
 EQUAL_STEPS: Root = ("equal_steps", {})

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c_lanes
 from eomgen.codegen.interface import Interface
+from eomgen.engine.structures import address
 from eomgen.native.compiler import find_compiler
 from eomgen.native.library import compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
@@ -22,7 +23,6 @@ from eomgen.program.program import Program
 from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.stability import HARM, TRIED
 from eomgen.run.problem import USUAL_LENGTH, FloatArray
-from eomgen.subset.structures import address
 
 FLAGS: dict[int, tuple[str, ...]] = {
     8: ("-O3", "-mavx512f", "-mfma"),

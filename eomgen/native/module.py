@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.engine.structures import address
 from eomgen.native.beside import BESIDE, function, reader_of
 from eomgen.run.module import given_values
 from eomgen.run.problem import FloatArray
-from eomgen.subset.structures import address
 
 MOST_KNOWN = 64
 """Largest number of parameter sets whose constants are kept."""

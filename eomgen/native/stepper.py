@@ -17,6 +17,7 @@ from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
 from eomgen.engine.contacts import TOLERANCE
 from eomgen.engine.printed import CONTACT_STEPS, c_source
+from eomgen.engine.structures import address
 from eomgen.model.model import Model
 from eomgen.native import contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
@@ -33,7 +34,6 @@ from eomgen.run.problem import USUAL_LENGTH, FloatArray
 from eomgen.run.projection import PROJECTS, Projection
 from eomgen.store import interfaced_program_of
 from eomgen.subset.languages import VECTORS, C
-from eomgen.subset.structures import address
 
 MAIN = "stepper.c"
 METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))

@@ -15,11 +15,11 @@ from eomgen.engine.adaptive_steps import Records, Start
 from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.methods import Root
+from eomgen.engine.structures import address, filled, take, with_room
 from eomgen.native import contact_runs
 from eomgen.native.mechanism import Mechanism, made_margins
 from eomgen.run import branches
 from eomgen.run.compiled import MEMORY, Array, Stretch, Stride, Watched, WholeRun
-from eomgen.subset.structures import address, filled, take, with_room
 
 ROOTS: list[Root] = [
     (name, {}) for name in ("adaptive_steps", "passed_over", "end_at", "normalised")

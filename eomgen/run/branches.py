@@ -30,13 +30,13 @@ from eomgen.engine.crossings import (
     turned,
 )
 from eomgen.engine.roots import Search
+from eomgen.engine.structures import with_room
 from eomgen.run.compiled import Watched
 from eomgen.run.integrators.interface import Tolerances
 from eomgen.run.localised import FREE, Features, Smooth, slope
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
 from eomgen.run.sliding import Returns
-from eomgen.subset.structures import with_room
 
 MOST_BRACKETS = 32
 """Most zeros in a step that compiled code finds."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from eomgen.engine.contacts import ContactLaw, Place, Touching
 from eomgen.engine.equal_steps import Course, Kept
+from eomgen.engine.structures import copied
 from eomgen.engine.sums import Sum
-from eomgen.subset.structures import copied
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

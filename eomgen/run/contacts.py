@@ -12,10 +12,10 @@ from eomgen.engine.contact_runs import CLOSED, NOT_FOUND, NOT_KEPT, OPENED, WHOL
 from eomgen.engine.contacts import Place, Touching, deepest, press
 from eomgen.engine.differences import differences
 from eomgen.engine.roots import Search
+from eomgen.engine.structures import with_room
 from eomgen.run.compiled import Touched
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
-from eomgen.subset.structures import with_room
 
 Rate = Callable[[float, FloatArray], FloatArray]
 """A function of time and state, such as the derivative."""

@@ -28,6 +28,7 @@ from eomgen.engine.contacts import (
     strike,
     weigh,
 )
+from eomgen.engine.structures import copied
 from eomgen.run.compiled import Strikes, Touched
 from eomgen.run.contacts import (
     Holding,
@@ -43,7 +44,6 @@ from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Advance, Begin, Resume
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event, Kind
-from eomgen.subset.structures import copied
 
 _NOTHING = np.empty(0), np.empty(0, np.int64)
 

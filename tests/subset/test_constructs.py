@@ -12,9 +12,9 @@ from campaign import some as some_of
 from languages import NONE, Given, results
 
 from eomgen.base.loading import load_source
+from eomgen.engine.structures import with_room
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
-from eomgen.subset.structures import with_room
 from eomgen.subset.text import NotInSubsetError, Text
 
 TEXT = Text.of(constructs)

@@ -13,8 +13,8 @@ from eomgen.engine import complementarity, least_squares
 from eomgen.engine.contacts import ALPHA, Place, Touching
 from eomgen.engine.printed import CONTACT_STEPS, CONTACTS, text
 from eomgen.engine.roots import Search
+from eomgen.engine.structures import with_room
 from eomgen.run.problem import FloatArray
-from eomgen.subset.structures import with_room
 
 SEEDED = np.random.default_rng(1)
 

@@ -14,7 +14,7 @@ from eomgen.engine import few
 from eomgen.engine.differences import differences
 from eomgen.engine.elimination import Factors, factored, solve_by
 from eomgen.engine.printed import text
-from eomgen.subset.structures import with_room
+from eomgen.engine.structures import with_room
 
 TEXT = text()
 SEEDED = np.random.default_rng(1)

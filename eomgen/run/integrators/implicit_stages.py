@@ -22,13 +22,13 @@ from eomgen.engine.implicit import (
     Stages,
     implicit_change,
 )
+from eomgen.engine.structures import with_room
 from eomgen.engine.symmetric import MOST_PROJECTED, Projected, projected_change
 from eomgen.engine.tableau import ButcherTableau
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.integrators.rattle import linkage_of, sizes_of
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.subset.structures import with_room
 
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
 WHY = {

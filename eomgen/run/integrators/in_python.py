@@ -9,6 +9,7 @@ import numpy as np
 from eomgen.engine.adaptive import AGAIN, EVENT, MADE, UNUSUAL, Progress
 from eomgen.engine.adaptive_steps import Records, Start, adaptive_steps
 from eomgen.engine.contact_times import SHARE
+from eomgen.engine.structures import with_room
 from eomgen.run.branches import Retry, Step
 from eomgen.run.compiled import MEMORY, Stride
 from eomgen.run.contacts import Within, meets
@@ -16,7 +17,6 @@ from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.maker import Maker
 from eomgen.run.integrators.stepper import Stepper
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.subset.structures import with_room
 
 AHEAD = 32
 """Greatest number of steps made at once: Ctrl-C is heard in each, progress is shown after them."""

@@ -10,11 +10,11 @@ from eomgen.engine.explicit import Step
 from eomgen.engine.implicit import DIVERGES, SINGULAR, UNSOLVED
 from eomgen.engine.rattle import MOST, Linked, rattle
 from eomgen.engine.separable import moved_force
+from eomgen.engine.structures import with_room
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Linkage, Projection, without
-from eomgen.subset.structures import with_room
 
 CHECKS = 3
 """Velocities at which forces are checked."""

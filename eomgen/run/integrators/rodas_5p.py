@@ -16,9 +16,9 @@ from eomgen.engine.rosenbrock import (
     rodas_within,
     rosenbrock_step,
 )
+from eomgen.engine.structures import with_room
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.integrators.maker import Maker
-from eomgen.subset.structures import with_room
 from eomgen.subset.words import Vector
 
 
