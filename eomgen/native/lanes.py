@@ -122,7 +122,7 @@ class Lanes:
     def function(self, name: str) -> Any:
         """The compiled function of an output, see `templates/c/lanes.c.jinja`."""
         call = self.library[f"columns_{name}"]
-        call.argtypes, call.restype = [_LONG, _REAL, *[Columns] * 3, *[_POINTER] * 2], None
+        call.argtypes = [_LONG, _REAL, *[Columns] * 3, _POINTER]
         return call
 
     def output(
@@ -131,9 +131,9 @@ class Lanes:
         """An output at time t and states (ny, n): (…, n), and which columns are valid."""
         y = np.ascontiguousarray(y, dtype=float)
         n, shape = y.shape[1], self.outputs[name]
-        out, sound = np.empty((math.prod(shape), n)), np.zeros(n, dtype=np.int8)
-        self.function(name)(n, t, *columns_of(y, k, u), out.ctypes.data, sound.ctypes.data)
-        return out.reshape(*shape, n), sound != 0
+        out = np.empty((math.prod(shape), n))
+        self.function(name)(n, t, *columns_of(y, k, u), address(out))
+        return out.reshape(*shape, n), ~np.isnan(out[0])
 
     def rk4(
         self,

@@ -66,7 +66,7 @@ OURS_IN_VECTORS = (
     "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
     "times reduced_angle bits_from sine_and_cosine put loaded lanes_of beside begin unit "
     "suspicious l i fused plus_product product_minus minus_product from_row to_row finite_lanes "
-    "FUSED SUM VECTORS AGAIN APART PLAIN TOGETHER SIZE slopes"
+    "FUSED SUM EVERY AGAIN APART PLAIN TOGETHER SIZE slopes"
 )
 VECTORS = replace(
     DIALECT,
