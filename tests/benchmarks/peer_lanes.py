@@ -35,8 +35,8 @@ def lanes(model: Model, y: np.ndarray) -> tuple[Callable[[], object], np.ndarray
     u = np.zeros((len(module.INPUTS), 1))
     found, sound = ours.output("derivative", 0.0, y, k, u)
     assert sound.all()
-    call, arrays = ours.function("derivative"), (y, k, u, found, np.empty(COLUMNS, np.int8))
-    arguments = (*columns_of(*arrays[:3]), *(array.ctypes.data for array in arrays[3:]))
+    call, arrays = ours.function("derivative"), (y, k, u, found)
+    arguments = (*columns_of(*arrays[:3]), found.ctypes.data)
 
     def compute(arrays: object = arrays) -> None:  # as Pinocchio's call, into arrays that are there
         call(COLUMNS, 0.0, *arguments)
