@@ -196,8 +196,9 @@ def anything(call: Callable[[], Any]) -> Any:
 def test_inputs_of_columns_and_those_that_are_wrong() -> None:
     """One set for all columns, or one for each; none that are not finite."""
     compiled, python = pair("cart_pole")
-    y = np.linspace(-1.0, 1.0, 12).reshape(4, 3)
-    for u in (np.array([2.0]), np.array([[1.0, 2.0, 3.0]]), {"push": 4.0}, np.array([np.nan])):
+    y = np.linspace(-4.0, 4.0, 200).reshape(4, 50)
+    each = np.linspace(1.0, 3.0, 50)[None]
+    for u in (np.array([2.0]), each, {"push": 4.0}, np.array([np.nan])):
         for state, theirs in (
             (y, partial(of_columns, python, "derivative")),
             (y[:, 0], python.derivative),
