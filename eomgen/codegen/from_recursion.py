@@ -10,7 +10,6 @@ from eomgen.codegen.recording import Recording
 from eomgen.codegen.sampling import sampling_labels, sampling_outputs
 from eomgen.codegen.system import (
     OutputNodes,
-    SamplingLabel,
     System,
     names_of_inputs,
     output_shape,
@@ -59,16 +58,14 @@ def from_recursion(
         parts = constraint_outputs(record)
         nodes |= {name: (shape, record.closed(part)) for name, (shape, part) in parts.items()}
     states = velocity_states(model)
-    sampling: tuple[SamplingLabel, ...] = ()
     if any(effect.sampling() for effect in model.effects):
         more, more_extra = sampling_outputs(record)
         nodes, extra = nodes | more, extra | more_extra
-        sampling = sampling_labels(model, [state.name for state in states])
     tangents = derivatives.tangents
     program = recorded(tape, nodes, [*checks(record), *conditions], tangents)
     labels = contact_labels(record.dynamics)
     given_of = model, record.route, states, program, extra, tangents
-    return System(*given_of, labels, sampling)
+    return System(*given_of, labels, sampling_labels(model, [state.name for state in states]))
 
 
 def output(record: Recording, name: str, extra: ExtraInputs) -> list[Node]:

@@ -1,6 +1,8 @@
 """Outputs of models with effects that sample: what a sample sets, and the seeds of its noise."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
 
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, SamplingLabel, names_of_inputs
@@ -13,6 +15,8 @@ from eomgen.scene.effects.base import Sampling
 def sampling_labels(model: Model, states: Sequence[str]) -> tuple[SamplingLabel, ...]:
     """The effects of a model that sample, with the places of what they set among the states."""
     place = {name: i for i, name in enumerate(states)}
+    if not model.sampled:
+        return ()
     per_second, clocks = clocks_of(model.effects)
     labels = []
     for sampling, clock in zip(_samplings(model), clocks, strict=True):
@@ -51,6 +55,43 @@ def sampling_outputs(record: Recording) -> tuple[OutputNodes, dict[str, tuple[st
         "seeds": ((len(seeds),), seeds),
     }
     return outputs, {"samples": names_of_inputs(given)}
+
+
+@dataclass(frozen=True)
+class ClockValues:
+    """The values of `engine.sampling.Clocks` that a model has from the beginning, in its order."""
+
+    many: int
+    sets: int
+    noises: int
+    pairs: int
+    per_second: float
+    periods: tuple[float, ...]
+    lags: tuple[float, ...]
+    first_set: tuple[int, ...]
+    first_noise: tuple[int, ...]
+    first_pair: tuple[int, ...]
+    places: tuple[int, ...]
+    targets: tuple[int, ...]
+    sources: tuple[int, ...]
+
+
+def clock_values(labels: Sequence[SamplingLabel]) -> ClockValues:
+    """Those of the effects that sample, at least one."""
+    sizes = zip(*((len(x.sets), len(x.noises), len(x.moves)) for x in labels), strict=True)
+    sets, noises, pairs = (tuple(accumulate(size, initial=0)) for size in sizes)
+    moves = [move for each in labels for move in each.moves]
+    return ClockValues(
+        *(len(labels), sets[-1], noises[-1], pairs[-1], float(labels[0].per_second)),
+        periods=tuple(float(each.period) for each in labels),
+        lags=tuple(float(each.lag) for each in labels),
+        first_set=sets,
+        first_noise=noises,
+        first_pair=pairs,
+        places=tuple(i for each in labels for i in each.sets),
+        targets=tuple(a for a, _ in moves),
+        sources=tuple(b for _, b in moves),
+    )
 
 
 def _samplings(model: Model) -> list[Sampling]:

@@ -59,6 +59,7 @@ ON_PAGES: tuple[Root, ...] = (
     *[(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")],
     *[(name, {}) for name in "first_length within passed_over end_at".split()],
     *[(name, {}) for name in "begin deepest press met ended release".split()],
+    *[(name, {}) for name in ("sample", "next_tick")],
 )
 """What a page that goes on live calls."""
 RECORDS: tuple[type, ...] = (

@@ -12,6 +12,7 @@ from eomgen.base.errors import SceneError
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.codegen.sampling import clock_values
 from eomgen.engine import implicit, printed, projection
 from eomgen.engine.contact_runs import MOST_EVENTS
 from eomgen.exports import Number, Options, Written
@@ -70,6 +71,8 @@ LIMITS = {
 """What holds of explicit steps, of those with loops, and of implicit ones."""
 LEFT_OUT = ("steps know no impacts: rigid contacts are left out of them",)
 """What is said of steps in `float` with rigid contacts."""
+UNSAMPLED = ("numbers are `float`, which have no exact times of samples: these are left to you",)
+"""What is said of controllers that sample, in `float`."""
 AT_EVENTS = f"; rigid contacts may strike or open {MOST_EVENTS} times in a step"
 """What holds beside that of steps with rigid contacts."""
 IN_FLOAT = {
@@ -99,6 +102,8 @@ def files(model: Model, options: Options) -> Written:
     rest = options.simulation.rest_speed if options.simulation else None
     meets = interface.contacts and number == "double"
     more = [*printed.CONTACT_STEPS, ("add_compensated", {}), ("differences", {})] if meets else []
+    clocks = clock_values(interface.sampling) if interface.sampling and number == "double" else None
+    more += [(name, {}) for name in ("sample", "next_tick") if clocks]
     step = step_of(method, interface, size, REALS, _text(number), more)
     called = {f: name for f, name in values["functions"] if f not in (*CIRCULAR, "abs")}
     called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.needed else {}
@@ -120,6 +125,7 @@ def files(model: Model, options: Options) -> Written:
         "nominals": list(map(repr, nominals_of(program, interface, start, size))) if meets else [],
         "solves": bool(method.needed),
         "implicit": "jacobian" in method.needed,
+        "clocks": clocks,
     }
     kind = "solves" if method.needed else "closes" if interface.projected else ""
     header = {
@@ -128,6 +134,8 @@ def files(model: Model, options: Options) -> Written:
         "functions": circular,
         "method": INTEGRATORS[method.name].about,
         "contacts": meets,
+        "clocks": clocks,
+        "samplers": ", ".join(label.effect for label in interface.sampling),
         "limits": LIMITS[kind] + AT_EVENTS * bool(meets),
     }
     example = _example(interface, len(values["held"]))
@@ -137,7 +145,10 @@ def files(model: Model, options: Options) -> Written:
             f"{name}.h": render(c.TEMPLATES, "firmware.h.jinja", header),
             f"{name}_observer.c": render(c.TEMPLATES, "firmware_example.c.jinja", example),
         },
-        LEFT_OUT if interface.contacts and not meets else (),
+        (
+            *(LEFT_OUT if interface.contacts and not meets else ()),
+            *(UNSAMPLED if interface.sampling and not clocks else ()),
+        ),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.base.templating import render, templates_folder
 from eomgen.codegen.backends import c
+from eomgen.codegen.sampling import clock_values
 from eomgen.codegen.series import series_functions
 from eomgen.engine import contact_runs, contact_times, contacts
 from eomgen.engine.crossings import MOST_PARTS
@@ -83,6 +84,7 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "last": DOP853.last,
         "parts": method.parts(interface, unit.series),
         "timed": _timed(unit),
+        "clocks": clock_values(interface.sampling) if interface.sampling else None,
     }
     source = render("fmu", "unit.c.jinja", context)
     return "\n".join((source, *_without(source), ""))
@@ -114,6 +116,8 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
         yield from [(name, {}) for name in called]
         if contacts:  # while they are held there are no series
             yield "explicit_step", {"method": DOP853}
+    if unit.interface.sampling:
+        yield from [("sample", {}), ("next_tick", {})]
     if method.adapts and (unit.switches or contacts):
         if "jacobian" in method.needed:
             yield "rodas_within", {}

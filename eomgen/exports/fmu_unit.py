@@ -10,7 +10,6 @@ from eomgen.codegen.series import FIXED, with_series
 from eomgen.exports.directions import with_directions
 from eomgen.exports.steps import nominals_of, size_of, start_of
 from eomgen.exports.units import rate_of
-from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
 from eomgen.program.program import Program
@@ -25,7 +24,8 @@ POSES = "body_poses"
 CONTACTS = ("gaps", "gap_rates", "impact", "held")
 CONSTRAINTS = ("constraint_residuals", "project_position", "project_velocity")
 SWITCHING = (OF_STATE, OF_TIME)
-KERNELS = ("derivative", *ENERGIES, POSES, *CONTACTS, *CONSTRAINTS, *SWITCHING)
+SAMPLING = ("samples", "seeds")
+KERNELS = ("derivative", *ENERGIES, POSES, *CONTACTS, *CONSTRAINTS, *SWITCHING, *SAMPLING)
 """The functions of a module that a unit has, as far as there are such."""
 
 
@@ -105,7 +105,6 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
         raise SceneError(
             f"form: an FMU has the state [q, v], not the form '{model.form}'; leave it out"
         )
-    check_no_samples(model, "FMUs")
     outputs = (*ENERGIES, POSES, *(name for name in needed if name in OUTPUTS))
     program, interface = interfaced_program_of(replace(model, outputs=outputs))
     starts = start_of(program, interface)

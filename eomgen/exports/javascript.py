@@ -1,13 +1,15 @@
 """An ES module of a scene: the functions of the JavaScript backend, and a step of the engine."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from eomgen.base.errors import SceneError
 from eomgen.base.templating import render
 from eomgen.codegen.backends import javascript
 from eomgen.codegen.interface import Interface
+from eomgen.codegen.sampling import clock_values
+from eomgen.codegen.system import SamplingLabel
 from eomgen.engine.contacts import Place, Touching
 from eomgen.engine.printed import CONTACT_STEPS, text
 from eomgen.exports import Options, Written
@@ -65,6 +67,8 @@ def _step(method: Method, interface: Interface, size: float, contacts: Mapping[s
     values, roots = method.values(interface), [*roots_of(method, interface)]
     if contacts["contacts"]:
         roots += [*CONTACT_STEPS, ("press", {}), ("add_compensated", {}), ("differences", {})]
+    if interface.sampling:
+        roots += [("sample", {}), ("next_tick", {})]
     context: dict[str, Any] = {
         **sizes_of(method, interface, size),
         "states": len(interface.states),
@@ -77,10 +81,25 @@ def _step(method: Method, interface: Interface, size: float, contacts: Mapping[s
         "parts": [{"name": p.name, "fields": _fields(p)} for p in method.parts(interface)],
         "rates": list(map(repr, method.rates)),
         "tangent": any(f.name == "jacobian" and f.tangent for f in interface.functions),
+        "clocks": clocks_in_javascript(interface.sampling) if interface.sampling else "",
         "about": INTEGRATORS[method.name].about,
         "rest": javascript.rest_of(interface),
     }
     return render(javascript.TEMPLATES, "step.js.jinja", context)
+
+
+def clocks_in_javascript(sampling: Sequence[SamplingLabel]) -> str:
+    """The fields of `engine.sampling.Clocks` in JavaScript, at the start and without seeds."""
+    fields = []
+    values = clock_values(sampling)
+    for name, value in vars(values).items():
+        if isinstance(value, tuple):
+            kind = "Float64Array" if name in ("periods", "lags") else "Int32Array"
+            fields.append(f"{name}: {kind}.of({', '.join(map(str, value))})")
+        else:
+            fields.append(f"{name}: {value}")
+    room = {"seeds": values.many, "made": values.many, "moved": values.many, "noise": values.noises}
+    return ", ".join([*fields, *(f"{n}: new Float64Array({size})" for n, size in room.items())])
 
 
 def _of_c(text: str) -> str:

@@ -23,7 +23,6 @@ from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.structures import extent, parts_of
 from eomgen.engine.symmetric import Projected
 from eomgen.engine.taylor import HIGHEST, Terms
-from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.program.tape import TIME
@@ -228,7 +227,6 @@ def method_of(name: str, model: Model, interface: Interface, *, adaptive: bool =
 
     Raises `RunError` if there is no such method, or if it cannot make steps of the model.
     """
-    check_no_samples(model, "steps of exported code")
     taken = [n for n in METHODS if adaptive or not isinstance(INTEGRATORS[n], Adaptive)]
     if name not in taken:
         raise RunError(

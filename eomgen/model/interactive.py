@@ -20,6 +20,7 @@ from eomgen.scene.effects.base import (
     JointLoad,
     Load,
     Mechanism,
+    Sampling,
     Scalar,
     Vector,
 )
@@ -58,6 +59,14 @@ class Switched(EffectTable):
         on = mechanism.value(Name(self.switch))
         for load in self.effect.loads(mechanism):
             yield scaled(load, on)
+
+    def sampling(self) -> Sampling | None:
+        """That of the effect, whether it is switched on or off."""
+        return cast(Sampling | None, self.effect.sampling())
+
+    def samples(self, mechanism: Mechanism, noise: Mapping[str, Scalar]) -> Sequence[Scalar]:
+        """Those of the effect."""
+        return cast(Sequence[Scalar], self.effect.samples(mechanism, noise))
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
         """Those of the effect."""

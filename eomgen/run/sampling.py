@@ -130,6 +130,7 @@ def sampled(of: Sampling, between: Between, t_start: float, t_end: float) -> Beg
         touched: Touched | None = None,
     ) -> Iterator[Advance]:
         clocks = of.clocks(t)
+        held = sorted({*clocks.places, *clocks.targets, *clocks.sources})
         start = max(t_start, _last_tick(clocks))
         while True:
             until = next_tick(clocks) / clocks.per_second
@@ -138,13 +139,15 @@ def sampled(of: Sampling, between: Between, t_start: float, t_end: float) -> Beg
             for advance in steps(problem, t, made, resume, touched):
                 made += advance.steps
                 reached = advance.t == until
+                rows = _holding(advance.samples, held, problem.initial)
                 if reached:
                     y = np.array(advance.y)
+                    y[held] = problem.initial[held]
                     of.sample(clocks, y)
-                    rows = _after(advance.samples, until, y)
+                    rows = _after(rows, until, y)
                     problem = problem.having(initial=y)
-                    advance = advance._replace(y=y, samples=rows, resume=None)
-                yield advance
+                    advance = advance._replace(y=y, resume=None)
+                yield advance._replace(samples=rows)
             if not reached or not until < t_end:
                 return
             start = t = until
@@ -159,6 +162,20 @@ def _last_tick(of: Clocks) -> float:
     parts = zip(of.moved, of.periods, of.lags, strict=True)
     last: float = max(*ticks, *(lag + (n - 1) * period for n, period, lag in parts))
     return last / of.per_second
+
+
+def _holding(rows: Sequence[Row], held: Sequence[int], y: FloatArray) -> Sequence[Row]:
+    """Rows in which what is held is as in y: between the ends of steps it may be rounded."""
+    if isinstance(rows, Rows):
+        states = rows.y.copy()
+        states[:, held] = y[held]
+        return Rows(rows.t, states)
+    found = []
+    for t, row in rows:
+        state = row.copy()
+        state[held] = y[held]
+        found.append((t, state))
+    return found
 
 
 def _after(rows: Sequence[Row], t: float, y: FloatArray) -> Sequence[Row]:

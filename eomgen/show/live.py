@@ -1,10 +1,12 @@
 """What the page of a run knows of its mechanism, as a table for JSON: names, units, values."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
 
+from eomgen.codegen.sampling import clock_values, sampling_labels
 from eomgen.model.interactive import interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
@@ -92,8 +94,15 @@ def live_table(
         "restSpeed": simulation.rest_speed,
         "keepsEnergy": keeps_energy(model, given),
         "integrator": _integrator(simulation),
+        "clocks": _clocks(live),
         "meanStep": mean_step,
     }
+
+
+def _clocks(model: Model) -> dict[str, Any] | None:
+    """The clocks of what samples, see `engine.sampling.Clocks`; None if nothing does."""
+    labels = sampling_labels(model, [s.name for s in velocity_states(model)])
+    return asdict(clock_values(labels)) if labels else None
 
 
 class Settable(Protocol):

@@ -8,7 +8,6 @@ import numpy as np
 from eomgen.base.errors import EomgenError
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.language.formula import Formula
-from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.results.simulated import Simulated
 from eomgen.run.module import load_module
@@ -53,7 +52,6 @@ def _live(
     if live is False:
         return None, ""
     try:
-        check_no_samples(model, "live pages")
         code = live_code(model, geometry, series=series)
     except EomgenError as error:
         if live:

@@ -74,6 +74,40 @@ const makeEngine = (mechanism, data) => {
   };
   let problem = free;
 
+  // ---- What samples ----
+
+  const clocks = data.clocks && Object.fromEntries(Object.entries(data.clocks).map(([name, x]) => {
+    const Numbers = ["periods", "lags"].includes(name) ? Float64Array : Int32Array;
+    return [name, Array.isArray(x) ? Numbers.from(x) : x];
+  }));
+  if (clocks) {
+    const [each, noise] = [() => new Float64Array(clocks.many), new Float64Array(clocks.noises)];
+    Object.assign(clocks, { seeds: each(), made: each(), moved: each(), noise });
+  }
+  const nextSample = () => (clocks ? steps.next_tick(clocks) / clocks.per_second : Infinity);
+  const sampled = {
+    samples: (t, y, noise, values) => values.set(mechanism.samples(t, y, engine.p, engine.u, noise)),
+  };
+  // Make what is due by now.
+  function makeSamples() {
+    clocks.seeds.set(mechanism.seeds(engine.t, engine.y, engine.p, engine.u));
+    while (nextSample() <= engine.t) steps.sample(sampled, clocks, engine.y);
+    renew();
+  }
+  // What was due up to the present time is past; at the start of the mechanism's own motion it is made.
+  function beginSamples(isStart) {
+    const past = (period, lag) => {
+      let count = Math.max(0, Math.floor((engine.t * clocks.per_second - lag) / period) - 1);
+      while ((lag + count * period) / clocks.per_second <= engine.t) count += 1;
+      return count;
+    };
+    for (let c = 0; c < clocks.many; c += 1) {
+      clocks.made[c] = isStart ? 0 : past(clocks.periods[c], 0);
+      clocks.moved[c] = isStart ? 0 : past(clocks.periods[c], clocks.lags[c]);
+    }
+    if (isStart) makeSamples();
+  }
+
   function unit(y) {
     if (steps.normalised(quaternions.length / 4, quaternions, y)) return y;
     for (let i = 0; i < quaternions.length; i += 4) {
@@ -175,7 +209,10 @@ const makeEngine = (mechanism, data) => {
       note(off);
       renew();
     }
-    const end = mark();
+    const [whole, due] = [mark(), nextSample()];
+    const end = due <= whole + 1e-9 * engine.dt ? due : whole;
+    const isWhole = Math.abs(whole - end) <= 1e-9 * engine.dt;
+    regular &&= isWhole;
     if (!way.go(t, y, regular ? engine.dt : end - t, end)) {
       throw new Error("the state overflows or is not a number: take a smaller step");
     }
@@ -190,7 +227,8 @@ const makeEngine = (mechanism, data) => {
       engine.t = end;
       y.set(way.last);
     }
-    regular = true;
+    if (end === due) makeSamples();
+    regular = isWhole;
     if (engine.onSample) engine.onSample(engine.t, engine.y);
   }
 
@@ -217,7 +255,7 @@ const makeEngine = (mechanism, data) => {
   function toMark() {
     const end = mark();
     try {
-      while (engine.t < end) makeStep();
+      while (engine.t < end - 1e-9 * engine.dt) makeStep();
       if (isSafe()) safe = engine.y.slice();
     } catch (error) {
       helped(error);
@@ -278,6 +316,7 @@ const makeEngine = (mechanism, data) => {
       change = all.find((m) => m.name === engine.method).make(free);
       law = makeLaw();
       restart();
+      if (clocks) beginSamples(y === null && t === 0);
     });
   };
   // Give state k a value. Loops take the other coordinates along: the state goes there in the directions that they allow.

@@ -44,7 +44,7 @@ OF_PAGE = (
     *("gaps", "gap_rates", "impact", "held"),
     *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
     *("constraint_rates", "constraint_jacobian", "mass_matrix", "kinetic_slopes", "fixed"),
-    *("velocity_force", "effect_forces", "constraint_forces"),
+    *("velocity_force", "effect_forces", "constraint_forces", "samples", "seeds"),
 )
 """The outputs that a page uses."""
 MOST = 300
