@@ -957,7 +957,7 @@ def Scene(
     name: str,
     title: str = ...,
     about: str = ...,
-    outputs: Literal["all"] | Sequence[Literal["forward_dynamics", "inverse_dynamics", "mass_matrix", "velocity_force", "gravity_force", "bias_force", "applied_force", "kinetic_energy", "potential_energy", "kinetic_slopes", "effect_powers", "effect_forces", "coordinates", "velocities", "accelerations", "momentum", "centre_of_mass", "joint_forces", "constraint_forces", "driving_forces", "body_poses", "body_velocities", "point_positions", "point_velocities", "point_jacobians", "input_jacobian", "parameter_jacobian", "frame_jacobians", "frame_jacobians_local", "frame_jacobians_world", "frame_bias_accelerations", "frame_bias_accelerations_local", "frame_bias_accelerations_world", "centre_of_mass_jacobian", "centroidal_momentum_matrix", "operational_mobilities", "operational_inertias", "coriolis_matrix", "regressor", "inverse_dynamics_derivatives", "forward_dynamics_derivatives"]] = ...,
+    outputs: Literal["all"] | Sequence[Literal["forward_dynamics", "inverse_dynamics", "mass_matrix", "velocity_force", "gravity_force", "bias_force", "applied_force", "kinetic_energy", "potential_energy", "kinetic_slopes", "effect_powers", "effect_forces", "coordinates", "velocities", "accelerations", "momentum", "centre_of_mass", "joint_forces", "constraint_forces", "driving_forces", "body_poses", "body_velocities", "point_positions", "point_velocities", "point_jacobians", "implicit_step", "input_jacobian", "parameter_jacobian", "frame_jacobians", "frame_jacobians_local", "frame_jacobians_world", "frame_bias_accelerations", "frame_bias_accelerations_local", "frame_bias_accelerations_world", "centre_of_mass_jacobian", "centroidal_momentum_matrix", "operational_mobilities", "operational_inertias", "coriolis_matrix", "regressor", "inverse_dynamics_derivatives", "forward_dynamics_derivatives"]] = ...,
     form: Literal["velocity", "momentum", "redundant"] = ...,
     parameters: Mapping[str, float | str | Table | Mapping[str, Any]] = ...,
     inputs: Sequence[str | Table | Mapping[str, Any]] = ...,
@@ -997,7 +997,7 @@ def Sensor(
 def Simulation(
     *,
     t_end: float = ...,
-    integrator: Literal["euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4", "implicit_midpoint", "gauss_4", "gauss_6", "RK45", "DOP853", "taylor", "Rodas5P", "Radau", "Radau_differences", "BDF", "BDF_differences", "LSODA"] = ...,
+    integrator: Literal["euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4", "linearly_implicit", "implicit_midpoint", "gauss_4", "gauss_6", "RK45", "DOP853", "taylor", "Rodas5P", "Radau", "Radau_differences", "BDF", "BDF_differences", "LSODA"] = ...,
     dt: float = ...,
     rtol: float = ...,
     atol: float | None = ...,

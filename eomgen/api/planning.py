@@ -184,6 +184,8 @@ def _is_rattle(setting: "Setting | None") -> bool:
 
 def _of_method(setting: "Setting | None", model: Model) -> tuple[str, ...]:
     """The outputs that a method needs."""
+    if setting is not None and (own := INTEGRATORS[setting.integrator].outputs):
+        return own
     if _is_rattle(setting) and model.constraints:
         return ("mass_matrix", "kinetic_slopes")
     return ()

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from eomgen.base.displays import Displayed
 from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.clocks import check_no_samples
+from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.native.lanes import columns_of
 from eomgen.native.stepper import METHODS, Beside, CompiledSteps, Limits
@@ -27,6 +29,7 @@ from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.sizes import mechanism_size
 from eomgen.store import bytecode_of, generated_code
 from eomgen.study.diagnosis import problem_of
+from eomgen.tables.integrators import INTEGRATORS
 
 Set = Mapping[str, ArrayLike] | ArrayLike | None
 Mask = NDArray[np.bool_]
@@ -47,7 +50,8 @@ def stepper(
     choose the inputs between them: `y = step(y, u)`.
 
     dt       length of a step, s
-    method   "euler", "semi_implicit_euler", "rk4", "leapfrog", "leapfrog_4", "leapfrog_6"
+    method   "euler", "semi_implicit_euler", "rk4", "leapfrog", "leapfrog_4", "leapfrog_6", or
+             "linearly_implicit" for long steps with stiff contacts, stops, springs and gains
     lanes    number of states, the columns of arrays (ny, lanes); None: one state, (ny,)
     backend  "c": compiled now, a state in each lane of vector registers; "numpy": columns in NumPy,
              with the same bits; "auto": "c" if there is a compiler
@@ -61,6 +65,8 @@ def stepper(
     model = model_of(scene, source)
     check_time(dt, "dt")
     method = NAMES.get(method, method)
+    if method in INTEGRATORS:
+        model = replace(model, outputs=in_order((*model.outputs, *INTEGRATORS[method].outputs)))
     if lanes is not None and lanes < 1:
         raise RunError(f"lanes: {lanes} is not a positive number")
     if backend not in BACKENDS:

@@ -42,7 +42,7 @@ from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task
 from eomgen.sweep.storage import Storage, opened
 from eomgen.sweep.together import METHODS, build
-from eomgen.tables.outputs import DYNAMICS, OUTPUTS
+from eomgen.tables.outputs import OUTPUTS
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 
@@ -111,7 +111,7 @@ def plan_sweep(
     """
     argument, vary = reporter.argument, options.vary
     check_samples(options.samples)
-    known = [n for n in OUTPUTS if n not in DYNAMICS]
+    known = [n for n, spec in OUTPUTS.items() if not spec.beside]
     for name in options.outputs:
         check_name(name, known, argument("outputs"), "output")
     steps = {"dt": options.dt, "rtol": options.rtol, "atol": options.atol}

@@ -18,7 +18,7 @@ from eomgen.codegen.system import (
 from eomgen.language.formula import is_zero
 from eomgen.model.states import initial_state, velocity_states
 from eomgen.program.program import Check
-from eomgen.program.tape import Node
+from eomgen.program.tape import Node, Stage
 from eomgen.tables.outputs import DERIVATIVES, OUTPUTS
 
 ExtraInputs = dict[str, tuple[str, ...]]
@@ -75,7 +75,10 @@ def output(record: Recording, name: str, extra: ExtraInputs) -> list[Node]:
     """
     spec = OUTPUTS[name]
     builder = resolve_name(f"eomgen.codegen.{spec.builder}")
-    given = (record.velocity_inputs(spec.beside),) if spec.beside else ()
+    given: tuple[list[Node], ...] = ()
+    if spec.beside:
+        single = [record.input(f"step__{spec.beside}", Stage.INPUTS)] if spec.single else None
+        given = (single or record.velocity_inputs(spec.beside),)
     if given:
         extra[name] = names_of_inputs(*given)
     nodes: list[Node] = builder(record, *given)

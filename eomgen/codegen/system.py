@@ -78,6 +78,7 @@ class System:
 def output_shape(name: str, model: Model) -> tuple[int, ...]:
     """The shape of an output of a model; for all outputs except matrices of derivatives."""
     sizes = {
+        "ny": len(model.states),
         "nv": len(model.velocities),
         "nq": len(model.coordinates),
         "bodies": len(model.bodies),

@@ -16,6 +16,7 @@ EQUAL: Mapping[str, Root] = {
     "leapfrog_4": ("composed", {"of": explicit.LEAPFROG_4}),
     "leapfrog_6": ("composed", {"of": explicit.LEAPFROG_6}),
     "rk4": ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
+    "linearly_implicit": ("linearly_implicit", {}),
     "implicit_midpoint": ("implicit_change", {"method": implicit.IMPLICIT_MIDPOINT}),
     "gauss_4": ("implicit_change", {"method": implicit.GAUSS_4}),
     "gauss_6": ("implicit_change", {"method": implicit.GAUSS_6}),

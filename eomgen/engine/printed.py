@@ -24,6 +24,7 @@ from eomgen.engine import (
     explicit,
     implicit,
     least_squares,
+    linearly_implicit,
     projection,
     quaternions,
     rattle,
@@ -95,12 +96,13 @@ CODES = {
 def text() -> Text:
     """The text of the whole engine."""
     adapted = (adaptive, adaptive_runs, adaptive_steps)
-    steps = (equal_steps, explicit, implicit, rosenbrock, sampled, sampling, taylor)
+    own = (linearly_implicit, sampled, sampling)
+    steps = (equal_steps, explicit, implicit, rosenbrock, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)
     return Text.of(
-        *adapted, *steps, *solved, *checks, *held, differences, quaternions, sums, system
+        *adapted, *steps, *own, *solved, *checks, *held, differences, quaternions, sums, system
     )
 
 

@@ -106,7 +106,7 @@ def files(model: Model, options: Options) -> Written:
     more += [(name, {}) for name in ("sample", "next_tick") if clocks]
     step = step_of(method, interface, size, REALS, _text(number), more)
     called = {f: name for f, name in values["functions"] if f not in (*CIRCULAR, "abs")}
-    called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.needed else {}
+    called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.solves else {}
     circular = [f for f in CIRCULAR if f in {f for f, _ in values["functions"]}]
     source = {
         **{key: value for key, value in values.items() if key != "functions"},
@@ -123,11 +123,11 @@ def files(model: Model, options: Options) -> Written:
         **contacts_of(interface, size, rest),
         "contacts": len(interface.contacts) if meets else 0,
         "nominals": list(map(repr, nominals_of(program, interface, start, size))) if meets else [],
-        "solves": bool(method.needed),
+        "solves": method.solves,
         "implicit": "jacobian" in method.needed,
         "clocks": clocks,
     }
-    kind = "solves" if method.needed else "closes" if interface.projected else ""
+    kind = "solves" if method.solves else "closes" if interface.projected else ""
     header = {
         **c.header(values, interface),
         "real": number,

@@ -23,12 +23,14 @@ from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.structures import extent, parts_of
 from eomgen.engine.symmetric import Projected
 from eomgen.engine.taylor import HIGHEST, Terms
+from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.program.tape import TIME
 from eomgen.program.taylor_text import SeriesText
 from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
 from eomgen.run.integrators.leapfrog import split_of
+from eomgen.run.integrators.linearly_implicit import rigid
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
@@ -42,6 +44,7 @@ _CALLS = {
     "runge_kutta": "system, t, y, h, step",
     "semi_implicit_euler": "system, positions, t, y, h, step",
     "leapfrog": "system, &split, t, y, h, step",
+    "linearly_implicit": "system, t, y, h, step",
     "implicit_change": "system, t, h, y, &stages",
     "projected_change": "system, system, t, h, (real *)y, &stages, &room_of",
     "rattle": "system, t, (real *)y, h, &room_of, step",
@@ -60,6 +63,7 @@ _GIVEN = {
     "projected_change": ("off_by", "drift_at", "rows_at"),
     "rattle": ("off_by", "rows_at", "rates_at", "inertia_at", "slopes_at"),
 }
+_RESISTED = ("implicit_step",)
 _IMPLICIT = ("implicit_change", "projected_change", "rodas_step")
 
 
@@ -94,10 +98,16 @@ class Method:
     def needed(self) -> tuple[str, ...]:
         """Functions of the module that it calls, beside the derivative and those of projection."""
         own = {"expanded": (FIXED,), **dict.fromkeys(_IMPLICIT, ("jacobian",))}
+        own["linearly_implicit"] = _RESISTED
         return (
             *own.get(self._one[0], ()),
             *(name for _, name in self.linkage if name != "derivative"),
         )
+
+    @property
+    def solves(self) -> bool:
+        """Whether the engine solves equations in a step."""
+        return bool(self.needed) and self.needed != _RESISTED
 
     @property
     def roots(self) -> Iterator[Root]:
@@ -152,6 +162,7 @@ class Method:
             "counts": function in (*_IMPLICIT, "rattle"),
             "stepped": function not in _IMPLICIT,
             "jacobian": function in _IMPLICIT,
+            "resisted": function == "linearly_implicit",
             "linkage": self.linkage,
         }
 
@@ -215,6 +226,8 @@ _NAME = re.compile(r"[A-Za-z_]\w*")
 
 def model_for(name: str, model: Model) -> Model:
     """The model as steps of a method take it: RATTLE those of all coordinates."""
+    if name in SPECS and (own := SPECS[name].outputs):
+        return replace(model, outputs=in_order((*model.outputs, *own)))
     if not (name in INTEGRATORS and SPECS[name].rattle and model.constraints):
         return model
     outputs = dict.fromkeys((*model.outputs, "mass_matrix", "kinetic_slopes"))
@@ -234,6 +247,8 @@ def method_of(name: str, model: Model, interface: Interface, *, adaptive: bool =
             f"these do: {', '.join(taken)}"
         )
     root = METHODS[name]
+    if name == "linearly_implicit" and interface.contacts:
+        raise RunError(rigid(interface.contacts[0].name))
     of: Root | None = ("leapfrog", {}) if root[0] == "composed" else None
     splits = (of or root)[0] == "leapfrog"
     rows = any(f.name == _LINKAGE["rows_at"] for f in interface.functions)

@@ -20,6 +20,7 @@ from eomgen.scene.effects.base import (
     JointLoad,
     Load,
     Mechanism,
+    Resistance,
     Sampling,
     Scalar,
     Vector,
@@ -32,6 +33,8 @@ OUTPUTS = (
 """The outputs of the interactive model."""
 OF_LOOPS = ("mass_matrix", "kinetic_slopes", "constraint_forces")
 """Those beside with constraints: for the steps of leapfrog, and in the equations of motion."""
+OF_STEPS = ("implicit_step",)
+"""Those for the steps of a method that a scene asks for."""
 
 
 class Switched(EffectTable):
@@ -67,6 +70,13 @@ class Switched(EffectTable):
     def samples(self, mechanism: Mechanism, noise: Mapping[str, Scalar]) -> Sequence[Scalar]:
         """Those of the effect."""
         return cast(Sequence[Scalar], self.effect.samples(mechanism, noise))
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Those of the effect times the switch."""
+        on = mechanism.value(Name(self.switch))
+        for each in self.effect.resistances(mechanism, h):
+            change = None if each.change is None else on * each.change
+            yield Resistance(each.loads, on * each.stiffness, on * each.damping, change)
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
         """Those of the effect."""
@@ -127,7 +137,11 @@ def interactive(model: Model) -> Model:
         parameters=(*model.parameters, *added),
         inputs=(*model.inputs, *(i for pull in pulls for i in pull.inputs(model.dimensions))),
         effects=cast(tuple[Effect, ...], (*effects, *pulls)),
-        outputs=(*OUTPUTS, *(OF_LOOPS if model.constraints else ())),
+        outputs=(
+            *OUTPUTS,
+            *(OF_LOOPS if model.constraints else ()),
+            *(name for name in OF_STEPS if name in model.outputs),
+        ),
         form="velocity",
         route=model.route if model.route != "closed" else "auto",
         loops_kept="projected",

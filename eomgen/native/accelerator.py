@@ -339,7 +339,8 @@ class _Steps:
     def equal(self, name: str) -> EqualSteps | None:
         """See `Compiled`."""
         needed, make = ("derivative", *self._projects, *self._contacts), equal_steps.steps
-        if name in implicit.GAUSS or (self._projects and name in equal_steps.LEAPFROGS):
+        leaps = self._projects and name in equal_steps.LEAPFROGS
+        if leaps or name in (*implicit.GAUSS, implicit.OWN_STEPS):
             needed, make = implicit.needed(name, self._problem), implicit.equal
         return self._once(name, needed, partial(make, name, self._problem))
 

@@ -1,12 +1,13 @@
 """Functions of a compiled module that take further numbers beside the state.
 
-These are forward and inverse dynamics, impacts of contacts, and what holds these. Arguments that
-are not plain floats and arrays of the expected lengths are left to the Python module, and so are
-columns of states.
+These are forward and inverse dynamics, implicit steps, impacts of contacts, and what holds these.
+Arguments that are not plain floats and arrays of the expected lengths are left to the Python
+module, and so are columns of states.
 """
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from eomgen.run.problem import FloatArray
 from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
-BESIDE = (*DYNAMICS, "impact", "held")
+BESIDE = (*DYNAMICS, "implicit_step", "impact", "held")
 _FLOAT = np.dtype(float)
 
 
@@ -61,6 +62,8 @@ def reader_of(module: Any, name: str, shape: tuple[int, ...]) -> Reader:
         return _impact(ny, len(module.CONTACTS))
     if name == "held":
         return _held(ny, len(module.CONTACTS))
+    if name == "implicit_step":
+        return partial(_stepped, ny)
     spec = OUTPUTS[name]
     forces = shape[spec.of(module.DIMENSIONS)[0].index("nv")]
     nq, nv = len(module.POSITIONS), forces
@@ -110,6 +113,13 @@ def impact_numbers(contacts: int, contact: int, bounce: float) -> FloatArray:
     numbers = np.zeros(contacts + 1)
     numbers[contact], numbers[-1] = 1.0, bounce
     return numbers
+
+
+def _stepped(ny: int, values: Mapping[str, Any]) -> Given | None:
+    t, y, h = values["t"], values["y"], values["h"]
+    if not (isinstance(t, float) and isinstance(h, float) and _are_plain(y)) or len(y) != ny:
+        return None
+    return Given(t, y, np.array([h]))
 
 
 def _held(ny: int, nc: int) -> Reader:

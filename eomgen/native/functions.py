@@ -145,6 +145,9 @@ class Compilable:
                 if hasattr(self.module, name)
             }
             projection = replace(projection, **made)
+        implicit_step = problem.implicit_step
+        if implicit_step is not None:
+            implicit_step = self.function("implicit_step", implicit_step, np.atleast_1d)
         jacobian = problem.jacobian
         if hasattr(self.module, "jacobian"):
             jacobian = self.function("jacobian", jacobian)
@@ -155,6 +158,7 @@ class Compilable:
             contacts=contacts,
             switching=switching,
             projection=projection,
+            implicit_step=implicit_step,
         )
 
     def function(

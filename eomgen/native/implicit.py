@@ -36,11 +36,13 @@ RATTLE = ("derivative", "mass_matrix", "kinetic_slopes", "constraint_jacobian")
 """The functions that a step of RATTLE calls, beside those that keep constraints."""
 DERIVATIVES = 2
 """Derivatives in such a step."""
+OWN_STEPS = "linearly_implicit"
+"""The method whose steps the module makes itself."""
 GAUSS = {
     name: known["method"] for name, (what, known) in EQUAL.items() if what == "implicit_change"
 }
 """The methods of equal steps."""
-LIBRARY = "implicit"
+LIBRARY = "method"
 """The first word of a name of a method's library among the others."""
 OPERATIONS = 1200, 5000
 """A method takes as long to compile as a function of about this many operations, for few and for
@@ -112,6 +114,8 @@ def sources(library: str, states: int) -> Mapping[str, str]:
 def needed(name: str, problem: Problem) -> tuple[str, ...]:
     """The names of the libraries of functions that a method needs, and last that of its own."""
     projects = PROJECTS if problem.projection else ()
+    if name == OWN_STEPS:
+        return ("derivative", "implicit_step", *projects, Library(name).name)
     if name in equal_steps.LEAPFROGS:
         return (*RATTLE, *projects, Library(name, constrained=True).name)
     held = bool(projects) and name in GAUSS
@@ -130,11 +134,13 @@ def equal(name: str, problem: Problem, of: Mechanism, library: ctypes.CDLL) -> E
         room = _with(of, problem, room=with_room(Linked, n=n, rows=rows))
         call = equal_steps.Call(library.steps, room, _NO_QUATERNIONS)
         return EqualSteps(call.made, DERIVATIVES * leaps)
+    quaternions = np.array(sum(problem.quaternions, ()), np.int64)
+    if name == OWN_STEPS:
+        return EqualSteps(equal_steps.Call(library.steps, of, quaternions).made, 0)
     many = len(GAUSS[name].b)
     room = _with(of, problem, stages=stages_of(many, problem))
     if problem.projection:
         room = _with(room, problem, room=projected_of(many, problem))
-    quaternions = np.array(sum(problem.quaternions, ()), np.int64)
     call = equal_steps.Call(library.steps, room, quaternions)
     return EqualSteps(call.made, many, iterates=True)
 

@@ -24,6 +24,7 @@ FUNCTIONS = (
     *KERNELS,
     *PROJECTS,
     *("constraint_rates", "constraint_jacobian", "mass_matrix", "kinetic_slopes"),
+    "implicit_step",
     *OF_STATE,
     *contact_runs.FUNCTIONS,
 )

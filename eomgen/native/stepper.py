@@ -22,6 +22,7 @@ from eomgen.model.model import Model
 from eomgen.native import contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
 from eomgen.native.compiler import NOT_JOINED, find_compiler
+from eomgen.native.implicit import OWN_STEPS
 from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
 from eomgen.native.library import compiled_library
 from eomgen.native.mechanism import Given, Mechanism, mechanism
@@ -36,7 +37,7 @@ from eomgen.store import interfaced_program_of
 from eomgen.subset.languages import VECTORS, C
 
 MAIN = "stepper.c"
-METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))
+METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"), OWN_STEPS)
 _POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
 
 
@@ -52,7 +53,8 @@ def sources(
 ) -> Mapping[str, str]:
     """The C sources of the derivative and of a method of `METHODS` for columns, name to text."""
     law = contact_runs.FUNCTIONS if interface.contacts else ()
-    kept = ("derivative", "initial_state", *law)
+    resisted = ("implicit_step",) if method == OWN_STEPS else ()
+    kept = ("derivative", "initial_state", *law, *resisted)
     of_contacts = contact_runs.sizes(interface)
     program, interface = functions.restricted(program, interface, kept)
     program = ordered(program)
@@ -63,11 +65,11 @@ def sources(
     alone = method in equal_steps.LEAPFROGS or timed or interface.contacts
     together = 2 if states < FEW and not alone else 1
     parts = method in ("leapfrog_4", "leapfrog_6")
-    call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS[method]
+    call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS.get(method, "")
     contact_steps = (*CONTACT_STEPS, ("add_compensated", {}))
     values: dict[str, Any] = {
         **c_lanes.columns(
-            program, interface, context, c.VECTORS, ("derivative", *law), USUAL_LENGTH
+            program, interface, context, c.VECTORS, ("derivative", *law, *resisted), USUAL_LENGTH
         ),
         **of_mechanism(),
         **of_contacts,
@@ -79,6 +81,7 @@ def sources(
         "positions": [i + n * states for n in range(together) for i in own["positions"]],
         "others": [i + n * states for n in range(together) for i in own["others"]],
         "together": together,
+        "resisted": bool(resisted),
         "call": call,
         "part": equal_steps.CALLS["leapfrog"] if parts else "",
     }

@@ -115,7 +115,12 @@ class ColumnSteps:
         def derivative(t: float, y: FloatArray) -> FloatArray:
             return self._module.derivative(t, y, given.p, given.u)
 
-        problem = replace(self._problem, derivative=derivative)
+        def implicit_step(t: float, y: FloatArray, h: float) -> FloatArray:
+            module: Any = self._module
+            return np.asarray(module.implicit_step(t, y, h, given.p, given.u))
+
+        own = None if self._problem.implicit_step is None else implicit_step
+        problem = replace(self._problem, derivative=derivative, implicit_step=own)
         with np.errstate(all="ignore"):
             for i in range(steps):
                 t: Any = given.t + i * self._dt

@@ -147,7 +147,16 @@ def as_problem(
         projection=projection,
         solved_loops=solved_loops,
         sampling=sampling_of(module, parameters, inputs),
+        implicit_step=_implicit_step(module, parameters, inputs),
     )
+
+
+def _implicit_step(
+    module: Any, parameters: Any, inputs: Any
+) -> Callable[[float, FloatArray, float], FloatArray] | None:
+    """The change of the state in a step that is implicit in stiff forces; None without it."""
+    function = getattr(module, "implicit_step", None)
+    return function and (lambda t, y, h: np.asarray(function(t, y, h, parameters, inputs)))
 
 
 def _rates(module: GeneratedModule, parameters: Any, inputs: Any) -> tuple[Rate, Rate]:

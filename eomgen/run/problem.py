@@ -125,6 +125,8 @@ class Problem:
     solved_loops the constraints that are kept in closed form; None if there are none
     sampling    controllers that sample; None if there are none
     scrutiny    what is checked beside that; None for an ordinary run
+    implicit_step (t, y, h) -> (ny,), the change of the state in a step that is implicit in stiff
+                forces; None if the module does not have it
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -153,6 +155,7 @@ class Problem:
     solved_loops: SolvedLoops | None = None
     scrutiny: Scrutiny | None = None
     sampling: Any = None  # a `run.sampling.Sampling`, which knows problems
+    implicit_step: Callable[[float, FloatArray, float], FloatArray] | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

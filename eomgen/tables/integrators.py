@@ -21,6 +21,7 @@ class IntegratorSpec:
     kind    by which tables and figures group it
     method  "module:attribute" in `package`: its `FixedStep` or `Adaptive`
     rattle  whether its steps with constraints are those of RATTLE, on all coordinates
+    outputs of the module that its steps call
     package where the module of its method is
     """
 
@@ -28,6 +29,7 @@ class IntegratorSpec:
     kind: Kind
     method: str
     rattle: bool = False
+    outputs: tuple[str, ...] = ()
     package: str = "eomgen.run.integrators"
 
 
@@ -52,6 +54,12 @@ _OWN: Mapping[str, IntegratorSpec] = {
         rattle=True,
     ),
     "rk4": IntegratorSpec("classical Runge-Kutta method, order 4", "explicit", "explicit:RK4"),
+    "linearly_implicit": IntegratorSpec(
+        "symplectic Euler, linearly implicit in stiff forces, order 1",
+        "implicit",
+        "linearly_implicit:INTEGRATOR",
+        outputs=("implicit_step",),
+    ),
     "implicit_midpoint": IntegratorSpec(
         "implicit midpoint rule, order 2", "symplectic", "implicit_stages:MIDPOINT"
     ),
@@ -79,3 +87,5 @@ _OWN: Mapping[str, IntegratorSpec] = {
 }
 INTEGRATORS: Mapping[str, IntegratorSpec] = {**_OWN, **added("integrators", _OWN)}
 """All integrators, those of other packages last."""
+GENERAL = tuple(name for name, spec in INTEGRATORS.items() if not spec.outputs)
+"""Those that step by the derivative, so that they take every module."""

@@ -30,6 +30,7 @@ class OutputSpec:
     contacts  whether forces of held rigid contacts, which it leaves out, would change it
     by        the variables by which it is the Jacobian of `derivative`; "" if it is not one
     beside    the prefix of inputs that it takes beside the state, one for each velocity; "": none
+    single    whether that is a single number instead
     units     the unit of its numbers, or those of linear and of angular components; () if they
               differ, or if it has none
     titles    what it is called in a figure, and its angular components; () for its name
@@ -48,6 +49,7 @@ class OutputSpec:
     contacts: bool = False
     by: str = ""
     beside: str = ""
+    single: bool = False
     units: tuple[str, ...] = ()
     titles: tuple[str, ...] = ()
     parts: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
@@ -352,6 +354,16 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         needs="points",
         forms=False,
     ),
+    "implicit_step": OutputSpec(
+        ("ny",),
+        "Change of the state (ny,) in a step of `h`, s, implicit in stiff loads: contacts, "
+        "friction, stops, springs, dampers and gains.",
+        "implicit_steps:implicit_step",
+        forms=False,
+        beside="h",
+        single=True,
+        usual=False,
+    ),
     "input_jacobian": OutputSpec(
         ("ny", "inputs"),
         "Exact Jacobian of `derivative` with respect to the inputs.",
@@ -407,9 +419,9 @@ JACOBIAN = OutputSpec(
 """The Jacobian, which every module has."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""
-DYNAMICS = tuple(name for name, spec in OUTPUTS.items() if spec.beside)
+DYNAMICS = tuple(name for name, spec in OUTPUTS.items() if spec.beside and not spec.single)
 """Outputs that take more than a time, a state, parameters and inputs."""
-SAVED = tuple(name for name in OUTPUTS if name not in (*DYNAMICS, *DERIVATIVES))
+SAVED = tuple(name for name, spec in OUTPUTS.items() if not spec.beside and name not in DERIVATIVES)
 """The outputs that a state determines, and that are no derivatives."""
 
 

@@ -57,6 +57,10 @@ const makeEngine = (mechanism, data) => {
     steps,
     held,
     f: derivative,
+    implicitStep: mechanism.implicitStep && ((t, y, h) => {
+      if (engine.grip) pullAt(t, y);
+      return mechanism.implicitStep(t, y, engine.p, engine.u, [h]);
+    }),
     placed: projected,
     touches: Boolean(mechanism.contacts?.length),
     arguments: given,

@@ -4,7 +4,7 @@
 //                y(t + h) - y(t); the next call may reuse the array
 //   suits(free)  whether it can make steps of the mechanism, if not every method can
 //
-// problem: {ny, positions, others, steps, held, f(t, y), sample(k)}; f returns an array that its next call may
+// problem: {ny, positions, others, steps, held, f(t, y), sample(k), implicitStep(t, y, h) or null}; f returns an array that its next call may
 // reuse; `steps` are the functions of the engine, `held` the constraints of loops, or null; see `loops`.
 
 const methods = (() => {
@@ -22,6 +22,10 @@ const methods = (() => {
       derivative(t, y, rates) {
         const slope = system.of.f(t, y);
         for (let k = 0; k < ny; k += 1) rates[k] = slope[k];
+      },
+      implicit_step(t, y, h, change) {
+        const made = free.implicitStep(t, y, h);
+        for (let k = 0; k < ny; k += 1) change[k] = made[k];
       },
       jacobian: (t, y, out) => steps.differences(system, sizes, t, y, out),
     };
@@ -44,6 +48,7 @@ const methods = (() => {
   };
   const rungeKutta = (name) => explicit((system, { steps }) => (...given) => steps[`runge_kutta_${name}`](system, ...given));
   const semiImplicit = explicit((system, { steps, positions }) => (...given) => steps.semi_implicit_euler(system, positions, ...given));
+  const resisted = explicit((system, { steps }) => (...given) => steps.linearly_implicit(system, ...given));
   const splitOf = (system, { steps, positions, others }, y) => {
     const split = steps.records.Split({ positions, others });
     steps.constant_rates(system, positions, others, y, split.rates);
@@ -123,6 +128,7 @@ const methods = (() => {
     { name: "leapfrog_4", about: "leapfrog composed to order 4", make: composed("leapfrog_4"), suits },
     { name: "leapfrog_6", about: "leapfrog composed to order 6", make: composed("leapfrog_6"), suits },
     { name: "rk4", about: "classical Runge-Kutta method, order 4", make: rungeKutta("rk4") },
+    { name: "linearly_implicit", about: "symplectic Euler, linearly implicit in stiff forces, order 1", make: resisted, suits: (free) => Boolean(free.implicitStep) && !free.touches },
     { name: "implicit_midpoint", about: "implicit midpoint rule, order 2", make: implicit("implicit_midpoint", 1) },
     { name: "gauss_4", about: "Gauss collocation, order 4", make: implicit("gauss_4", 2) },
     { name: "gauss_6", about: "Gauss collocation, order 6", make: implicit("gauss_6", 3) },

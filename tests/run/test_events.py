@@ -17,11 +17,12 @@ from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Contacts, Problem
 from eomgen.run.works import Powers
+from eomgen.tables.integrators import GENERAL as GENERAL_METHODS
 
 G = 9.81
-FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
+FIXED = [name for name in GENERAL_METHODS if isinstance(INTEGRATORS[name], FixedStep)]
 # Leapfrog cannot run contacts.
-GENERAL = [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor"))]
+GENERAL = [name for name in GENERAL_METHODS if not name.startswith(("leapfrog", "taylor"))]
 A_FEW = some([n for n in GENERAL if not n.endswith(("_differences", "_6", "euler"))], GENERAL)
 EXACT = {"rtol": 1e-12, "atol": 1e-14}
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}

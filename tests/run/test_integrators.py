@@ -29,10 +29,11 @@ from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.problem import Problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Outcome
+from eomgen.tables.integrators import GENERAL as GENERAL_METHODS
 
-FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
+FIXED = [name for name in GENERAL_METHODS if isinstance(INTEGRATORS[name], FixedStep)]
 SERIES = [name for name, method in INTEGRATORS.items() if getattr(method, "series", "")]
-ADAPTIVE = [name for name in INTEGRATORS if name not in (*FIXED, *SERIES)]
+ADAPTIVE = [name for name in GENERAL_METHODS if name not in (*FIXED, *SERIES)]
 ALL = [*FIXED, *ADAPTIVE]
 KNOWN = ", ".join(INTEGRATORS)
 # Leapfrog and its compositions can integrate few problems.

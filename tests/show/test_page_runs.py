@@ -47,6 +47,7 @@ pytestmark = [
 
 EXPLICIT = {
     **dict.fromkeys(("euler", "semi_implicit_euler"), 0.001),
+    "linearly_implicit": 0.005,
     **dict.fromkeys(("rk4", "leapfrog", "leapfrog_4", "leapfrog_6"), 0.005),
 }
 IMPLICIT = {"implicit_midpoint": 0.005, "gauss_4": 0.01, "gauss_6": 0.02}
@@ -132,6 +133,7 @@ def both_runs(of: str, method: str, dt: float, seconds: float) -> tuple[Any, Tra
     """The page's run and the one in Python of a scene, with rows at the same times."""
     scene = read(of).replaced(loops="projected")
     model = model_of(scene, of)
+    model = replace(model, outputs=(*model.outputs, *INTEGRATORS[method].outputs))
     code, problem = live_code(model, series=method == "taylor"), in_python(model)
     given: dict[str, Any] = {
         "data": live_table(model, code, scene.simulation),

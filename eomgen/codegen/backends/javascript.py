@@ -45,6 +45,7 @@ OF_PAGE = (
     *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
     *("constraint_rates", "constraint_jacobian", "mass_matrix", "kinetic_slopes", "fixed"),
     *("velocity_force", "effect_forces", "constraint_forces", "samples", "seeds"),
+    "implicit_step",
 )
 """The outputs that a page uses."""
 MOST = 300

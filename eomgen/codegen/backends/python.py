@@ -95,7 +95,7 @@ def module(program: Program, interface: Interface) -> str:
     dynamics = [(n, OUTPUTS[n].beside, "=None" * (OUTPUTS[n].beside == "tau")) for n in DYNAMICS]
     matrices = [k.function.name for k in kernels if k.function.matrix]
     special = {"initial_state", "derivative", *matrices, *(name for name, _, _ in dynamics)}
-    special |= {"impact", "held", "samples"}
+    special |= {"impact", "held", "samples", "implicit_step"}
     context = _facts(interface) | {
         "about": document(interface, costs["derivative"]),
         "parameter_names": ", ".join(constants.parameters),
@@ -104,6 +104,7 @@ def module(program: Program, interface: Interface) -> str:
         "impact": written.get("impact"),
         "held": written.get("held"),
         "samples": written.get("samples"),
+        "implicit_step": written.get("implicit_step"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
         "kernels": list(written.values()),
         "math_functions": sorted({*SHELL, *(f for f in called if hasattr(math, f))}),

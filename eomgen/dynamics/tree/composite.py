@@ -121,23 +121,33 @@ class Factors:
 
     d      the diagonal of D, (nv,)
     lower  the entries of L below the diagonal
-    above  the ancestors of each velocity
+    above  of each velocity its ancestors, or those that it is coupled to otherwise
+    order  in which they are eliminated, each before those above it
     """
 
     d: tuple[Scalar, ...]
     lower: Entries
     above: tuple[tuple[int, ...], ...]
+    order: tuple[int, ...]
 
 
 def factorised(
-    entries: Entries, above: tuple[tuple[int, ...], ...], names: Sequence[str], scalars: Scalars
+    entries: Entries,
+    above: tuple[tuple[int, ...], ...],
+    names: Sequence[str],
+    scalars: Scalars,
+    order: Sequence[int] = (),
 ) -> Factors:
-    """Factor M from the leaves to the root. There is no fill-in, and M needs no pivoting, since it
-    is positive definite.
+    """Factor M from the leaves to the root, or another matrix in a given order, with what fills in
+    among those `above`. M needs no fill-in; neither needs pivoting if it is positive definite.
     """
     work = dict(entries)
     lower: dict[tuple[int, int], Scalar] = {}
-    order = sorted(range(len(above)), key=lambda i: len(above[i]), reverse=True)
+    order = order or _from_leaves(above)
+    zero = scalars.number(0.0)
+    for k in order:
+        for i in above[k]:
+            work.setdefault((k, i), zero)
     for k in order:
         d = work[k, k] = scalars.named(work[k, k], f"pivot_{names[k]}")
         for i in above[k]:
@@ -145,13 +155,16 @@ def factorised(
         for n, i in enumerate(above[k]):
             for j in above[k][n:]:
                 work[i, j] = work[i, j] - lower[k, i] * work[k, j]
-    return Factors(tuple(work[k, k] for k in range(len(above))), lower, above)
+    return Factors(tuple(work[k, k] for k in range(len(above))), lower, above, tuple(order))
+
+
+def _from_leaves(above: tuple[tuple[int, ...], ...]) -> list[int]:
+    return sorted(range(len(above)), key=lambda i: len(above[i]), reverse=True)
 
 
 def solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
     """Solve M x = right, (nv,), by Lᵀ D L."""
-    x = list(right)
-    order = sorted(range(len(x)), key=lambda i: len(factors.above[i]), reverse=True)
+    x, order = list(right), factors.order
     for k in order:
         for i in factors.above[k]:
             x[i] = x[i] - factors.lower[k, i] * x[k]

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from eomgen.dynamics.tree import forces as fc
+from eomgen.dynamics.tree.kinematics import TreeKinematics
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.dynamics.tree.observables import arm
 from eomgen.dynamics.tree.vectors import Vec, add, cross, in_space, torque_in_space, zeros
@@ -66,14 +67,19 @@ def _in_world(d: MechanismState, body: str, at: Vector, force: Vec, torque: Vec)
     return fc.Wrench(add(torque, cross(reach, force)), force)
 
 
-def wrench_of(d: MechanismState, load: Load) -> tuple[int, fc.Wrench]:
-    """The frame of a load's body, -1 for the world, and its wrench there, in the link's axes."""
+def wrench_of(
+    d: MechanismState, load: Load, kinematics: TreeKinematics | None = None
+) -> tuple[int, fc.Wrench]:
+    """The frame of a load's body, -1 for the world, and its wrench there, in the link's axes, by
+    default those of the recursions.
+    """
+    links = kinematics or d.kinematics
     frame = -1 if load.body == WORLD else d.linkage.mounts[d.index[load.body]].frame
     if frame < 0:
         return -1, fc.no_wrench(d.scalars)
     force, torque = in_space(load.force, d.scalars), torque_in_space(load.torque, d.scalars)
     f = _in_world(d, load.body, load.at, force, torque)
-    return frame, fc.Wrench(*(d.kinematics.from_world(frame, part) for part in (f.moment, f.force)))
+    return frame, fc.Wrench(*(links.from_world(frame, part) for part in (f.moment, f.force)))
 
 
 def power_of(d: MechanismState, loads: Iterable[AnyLoad]) -> Scalar:

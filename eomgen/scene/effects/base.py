@@ -137,6 +137,23 @@ class Contact:
     """Slip below which friction is smoothed while the contact stays closed, m/s."""
 
 
+@dataclass(frozen=True)
+class Resistance:
+    """How fast a load grows against motion: along `loads`, those of a unit force, whose power is
+    the speed of the motion, the force falls by `stiffness` for each m or rad and by `damping` for
+    each m/s or rad/s.
+
+    Steps that are implicit in stiff forces take it: it need not be exact, but the matrix of all
+    resistances of an effect together must not be negative. `change` is by how much the force along
+    the loads is greater at the end of a step at these velocities; None if the stiffness says it.
+    """
+
+    loads: tuple[Load | JointLoad, ...]
+    stiffness: Scalar
+    damping: Scalar
+    change: Scalar | None = None
+
+
 class Mechanism(Protocol):
     """What effects can read of a mechanism. Vectors are in world axes unless stated otherwise."""
 
@@ -303,6 +320,12 @@ class EffectTable(Table):
 
     def samples(self, mechanism: Mechanism, noise: Mapping[str, Scalar]) -> Sequence[Scalar]:
         """What a sample gives `Sampling.sets` and `holds`, with a normal number for each noise."""
+        return ()
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterable[Resistance]:
+        """How its loads resist motion in a step of length h, s; none for loads that are not
+        stiff.
+        """
         return ()
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Soft and rigid contact of bodies with a plane, with a sphere or with each other."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -8,7 +9,7 @@ from pydantic import Field, model_validator
 from eomgen.language.conditions import Condition, a_part, are_zero
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
+from eomgen.scene.effects.base import Contact, Load, Mechanism, Resistance, Scalar, Vector
 from eomgen.scene.effects.bodies import wrong
 from eomgen.scene.effects.contact_geometry import ContactGeometry
 from eomgen.scene.effects.touching import (
@@ -21,7 +22,7 @@ from eomgen.scene.effects.touching import (
     pressed,
     tangents,
 )
-from eomgen.scene.effects.vectors import LEAST_SQUARE, dot
+from eomgen.scene.effects.vectors import LEAST_SQUARE, at_least_zero, dot
 
 LAWS = {
     "spring_damper": ("stiffness", "damping", "allow_active"),
@@ -140,14 +141,63 @@ dissipation = 0.2
                 continue
             gap_rate, slip = gap_rate_and_slip(mechanism, touch)
             force = pressed(touch, self._named_force(mechanism, touch, gap_rate))
-            speed = self._slip_speed(mechanism)
-            size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
-            drag = mechanism.value(self.friction) * force / size
-            if touch.share is not None:
-                drag = drag * touch.share
+            drag = self._drag(mechanism, touch, force, slip)
             pairs = zip(touch.normal, slip, strict=True)
             found += point_loads(touch, tuple(force * n - drag * u for n, u in pairs))
         yield from merged(found)
+
+    def _drag(self, mechanism: Mechanism, touch: Touch, force: Scalar, slip: Vector) -> Scalar:
+        """The friction of a normal force over the slip velocity, N s/m."""
+        speed = self._slip_speed(mechanism)
+        size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
+        drag = mechanism.value(self.friction) * force / size
+        return drag if touch.share is None else drag * touch.share
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Along the gap the slopes of the normal force; across it the drag of friction over the
+        slip, of the normal force before the step.
+
+        What touches only where the step leads has the force there, for the part of the step in
+        which it touches: so it takes at least the energy from the motion that the contact stores.
+        """
+        if self.law == "impact":
+            return
+        one, nothing = mechanism.number(1.0), mechanism.zero
+        for touch in self.touches(mechanism):
+            gap_rate, slip = gap_rate_and_slip(mechanism, touch)
+            step = h * gap_rate
+            closing = mechanism.call("max", -step, mechanism.number(LEAST_SQUARE))
+            gap = mechanism.call("select", -touch.gap, touch.gap, touch.gap + step)
+            part = mechanism.call("select", -touch.gap, one, -gap / closing)
+            ahead = replace(touch, gap=gap)
+            force = part * self._force(mechanism, ahead, gap_rate)
+            stiffness, damping = (part * x for x in self._slopes(mechanism, ahead, gap_rate))
+            before = self._force(mechanism, touch, gap_rate)
+            change = mechanism.call("select", -touch.gap, -(stiffness * step), force)
+            if self.friction != ZERO:
+                drag = self._drag(mechanism, touch, pressed(touch, before), slip)
+                for i in range(len(slip)):
+                    axis = tuple(one if i == j else nothing for j in range(len(slip)))
+                    yield Resistance(point_loads(touch, axis), nothing, drag)
+                square = one if touch.slope is None else touch.slope * touch.slope
+                damping = damping - drag / square
+            yield Resistance(normal_loads(touch, one), stiffness, damping, change)
+
+    def _slopes(
+        self, mechanism: Mechanism, touch: Touch, gap_rate: Scalar
+    ) -> tuple[Scalar, Scalar]:
+        """How fast the normal force grows with the depth and with its rate, at least 0."""
+        force, nothing = self._force(mechanism, touch, gap_rate), mechanism.zero
+        if self.law == "spring_damper":
+            parts = (self.stiffness, self.damping)
+            found = [at_least_zero(mechanism, mechanism.value(part)) for part in parts]
+        else:
+            depth = mechanism.call("max", -touch.gap, mechanism.number(LEAST_SQUARE))
+            elastic = self._elastic(mechanism, touch)
+            factor = mechanism.number(1.5)
+            found = [factor * force / depth, factor * mechanism.value(self.dissipation) * elastic]
+        stiffness, damping = (mechanism.call("select", force, x, nothing) for x in found)
+        return stiffness, damping
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k d² or 2/5 k d^2.5, summed over contacts, J."""

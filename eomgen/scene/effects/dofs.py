@@ -9,7 +9,14 @@ from pydantic import Field, model_validator
 from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Identifier
 from eomgen.language.formula import Formula
-from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
+from eomgen.scene.effects.base import (
+    EffectTable,
+    JointLoad,
+    Mechanism,
+    Resistance,
+    Scalar,
+    Vector,
+)
 from eomgen.scene.effects.bodies import wrong
 from eomgen.scene.effects.elements import AtJoint, Layout
 from eomgen.scene.effects.vectors import dot, length, scale
@@ -42,6 +49,14 @@ class Dof:
         """Loads on the child of generalised forces along its velocities."""
         for i, force in enumerate(forces):
             yield JointLoad(self.joint, force, self.first + i)
+
+    def resisting(
+        self, mechanism: Mechanism, stiffness: Scalar, damping: Scalar
+    ) -> Iterator[Resistance]:
+        """The same resistance along each of its velocities."""
+        for i in range(len(self.rates)):
+            load = JointLoad(self.joint, mechanism.number(1.0), self.first + i)
+            yield Resistance((load,), stiffness, damping)
 
     def along(self, force: Scalar) -> tuple[Scalar, ...]:
         """The generalised forces along its velocities of a force along `direction`."""

@@ -8,9 +8,12 @@ from pydantic import Field
 from eomgen.base.errors import SceneError
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.effects.base import JointLoad, Mechanism, Vector
+from eomgen.scene.effects.base import JointLoad, Mechanism, Resistance, Scalar, Vector
 from eomgen.scene.effects.dofs import OnJoints
-from eomgen.scene.effects.vectors import add, length, negative, scale
+from eomgen.scene.effects.vectors import add, at_least_zero, length, negative, scale
+
+LEAST_SLIP = 1e-6
+"""Below this part of its speed Coulomb friction is linear to the last digit."""
 
 
 class JointFriction(OnJoints):
@@ -69,6 +72,18 @@ speed = 0.01
             if self.speed is not None:
                 friction = add(friction, self._coulomb(mechanism, dof.rates))
             yield from dof.loads(negative(friction))
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """That of the secant, b + C tanh(|v|/speed)/|v|: friction never overshoots rest."""
+        for dof in self.dofs(mechanism):
+            damping = at_least_zero(mechanism, mechanism.value(self.viscous))
+            if self.speed is not None:
+                coulomb, speed = mechanism.value(self.coulomb), mechanism.value(self.speed)
+                least = mechanism.number(LEAST_SLIP) * speed
+                size = mechanism.call("max", length(mechanism, dof.rates), least)
+                secant = coulomb * mechanism.call("tanh", size / speed) / size
+                damping = damping + at_least_zero(mechanism, secant)
+            yield from dof.resisting(mechanism, mechanism.zero, damping)
 
     def _coulomb(self, mechanism: Mechanism, rates: Vector) -> Vector:
         """C tanh(|v|/speed) v/|v|, N m or N."""

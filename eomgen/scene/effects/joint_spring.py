@@ -10,10 +10,10 @@ from eomgen.base.errors import SceneError
 from eomgen.language.conditions import are_zero
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.base import JointLoad, Mechanism, Resistance, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
 from eomgen.scene.effects.elements import AtJoint
-from eomgen.scene.effects.spring import check_law
+from eomgen.scene.effects.spring import check_law, law_slopes
 
 
 class JointSpring(OnJoints):
@@ -87,6 +87,14 @@ rest = 0.5
             damping = mechanism.value(self.damping)
             pairs = zip(dof.along(back), dof.rates, strict=True)
             yield from dof.loads([-(force + damping * rate) for force, rate in pairs])
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Of a ball joint as for small angles, alike about all axes."""
+        for dof in self.dofs(mechanism):
+            stiffness, damping = law_slopes(
+                self, mechanism, self._stretch(mechanism, dof) if self.law else None, dof.rate
+            )
+            yield from dof.resisting(mechanism, stiffness, damping)
 
     def drawn(self, at: AtJoint) -> AtJoint:
         """A torsion spring, or a coil along a slider."""

@@ -10,10 +10,10 @@ from eomgen.base.errors import SceneError
 from eomgen.language.conditions import Condition, a_part, are_zero, in_order
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Resistance, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
 from eomgen.scene.effects.elements import AtJoint
-from eomgen.scene.effects.vectors import negative
+from eomgen.scene.effects.vectors import LEAST_SQUARE, at_least_zero, negative
 
 
 class JointStop(OnJoints):
@@ -104,6 +104,30 @@ damping = 1.0
             return
         for dof in self.dofs(mechanism):
             yield from dof.loads(negative(dof.along(self._back(mechanism, dof))))
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Those of stops that push back where the step leads; what reaches a limit only within the
+        step has that force for a part of it, as contacts.
+        """
+        if self.restitution is not None:
+            return
+        one, nothing = mechanism.number(1.0), mechanism.zero
+        slopes = [
+            at_least_zero(mechanism, mechanism.value(x)) for x in (self.stiffness, self.damping)
+        ]
+        for dof in self.dofs(mechanism):
+            step, here = h * dof.rate, self._beyond(mechanism, dof)
+            inside = here * here
+            value = mechanism.call("select", inside, dof.value, dof.value + step)
+            ahead = replace(dof, value=value)
+            there, force = self._beyond(mechanism, ahead), self._back(mechanism, ahead)
+            size = mechanism.call("abs", step)
+            size = mechanism.call("max", size, mechanism.number(LEAST_SQUARE))
+            part = mechanism.call("select", inside, one, mechanism.call("abs", there) / size)
+            share = mechanism.call("select", force * there, part, nothing)
+            stiffness, damping = (share * x for x in slopes)
+            change = mechanism.call("select", inside, -(stiffness * step), -(part * force))
+            yield Resistance(tuple(dof.loads(dof.along(one))), stiffness, damping, change)
 
     def _back(self, mechanism: Mechanism, dof: Dof) -> Scalar:
         """k x + c dq/dt, N m or N, if it pushes back from the limit, else 0."""

@@ -7,8 +7,9 @@ from pydantic import Field
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.effects.base import ExtraState, JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.base import ExtraState, JointLoad, Mechanism, Resistance, Scalar
 from eomgen.scene.effects.dofs import OnCoordinate
+from eomgen.scene.effects.vectors import at_least_zero
 
 
 class Servo(OnCoordinate):
@@ -57,6 +58,20 @@ class Servo(OnCoordinate):
         limit = mechanism.value(self.limit)
         (command,) = mechanism.called("c", command)
         return mechanism.call("max", -limit, mechanism.call("min", limit, command))
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Those of its gains, while the command is within the limit and acts without lag."""
+        if self.lag is not None:
+            return
+        gains = [
+            at_least_zero(mechanism, mechanism.value(x)) for x in (self.stiffness, self.damping)
+        ]
+        if self.limit is not None:
+            command = self.unlimited_command(mechanism)
+            inside = mechanism.value(self.limit) - mechanism.call("abs", command)
+            gains = [mechanism.call("select", inside, x, mechanism.zero) for x in gains]
+        load = JointLoad(self.joint, mechanism.number(1.0), self.coordinate_index(mechanism))
+        yield Resistance((load,), gains[0], gains[1])
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
         """The torque of an actuator with lag, if there is one."""

@@ -2,19 +2,20 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, are_zero, not_negative
+from eomgen.language.derivatives import derivative
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
-from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar
+from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Resistance, Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.elements import Attachment, Layout, Link
-from eomgen.scene.effects.vectors import dot, nearest_square, negative, sub
+from eomgen.scene.effects.vectors import at_least_zero, dot, nearest_square, negative, sub
 
 
 class Spring(EffectTable):
@@ -89,8 +90,7 @@ rest_length = 0.5
         """Equal and opposite forces on the two bodies."""
         line = line_of(self, mechanism)
         pull = self._pull(mechanism, line)
-        yield Load(self.body_1, pull, line.at_1, "applied")
-        yield Load(self.body_2, negative(pull), line.at_2, "applied")
+        yield from self._between(line, pull)
 
     def _pull(self, mechanism: Mechanism, line: "Line") -> tuple[Scalar, ...]:
         """The force on point 1, world axes."""
@@ -111,6 +111,36 @@ rest_length = 0.5
         taut = mechanism.call("min", stretch, tension + damping * rate)
         nothing = mechanism.zero
         return tuple(mechanism.call("select", taut, part, nothing) for part in pull)
+
+    def resistances(self, mechanism: Mechanism, h: Scalar) -> Iterator[Resistance]:
+        """Along the line that of the law; across it that of the pull as the line turns, unless it
+        is a push, which does not resist.
+        """
+        line, one = line_of(self, mechanism), mechanism.number(1.0)
+        along, damping = law_slopes(self, mechanism, line.stretch if self.law else None, line.rate)
+        if self.law is not None:
+            pull = mechanism.value(self.law, stretch=line.stretch, rate=line.rate)
+        else:
+            pull = mechanism.value(self.stiffness) * line.stretch
+        across = at_least_zero(mechanism, pull / line.length)
+        if self.tension_only:
+            taut = mechanism.call("min", line.stretch, pull + damping * line.rate)
+            along, across, damping = (
+                mechanism.call("select", taut, x, mechanism.zero) for x in (along, across, damping)
+            )
+        nothing = (mechanism.zero,) * (mechanism.dimensions - 1)
+        for i in range(mechanism.dimensions):
+            axis = (*nothing[:i], one, *nothing[i:])
+            yield Resistance(self._between(line, axis), across, mechanism.zero)
+        unit = tuple(x / line.length for x in line.d)
+        yield Resistance(self._between(line, unit), along - across, damping)
+
+    def _between(self, line: "Line", force: tuple[Scalar, ...]) -> tuple[Load, Load]:
+        """The loads of a force on point 1 and its reaction on point 2."""
+        return (
+            Load(self.body_1, force, line.at_1, "applied"),
+            Load(self.body_2, negative(force), line.at_2, "applied"),
+        )
 
     def elements(self, layout: Layout) -> Iterator[Link]:
         """A coil, a damper, both, or a rope."""
@@ -195,6 +225,22 @@ def line_of(spring: Spring, mechanism: Mechanism) -> Line:
     (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
     (stretch,) = mechanism.called("s", length - mechanism.value(spring.rest_length))
     return Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
+
+
+def law_slopes(
+    effect: Any, mechanism: Mechanism, stretch: Scalar | None, rate: Scalar
+) -> tuple[Scalar, Scalar]:
+    """How fast the force of a spring grows with its stretch and its rate, at least 0, of its law if
+    the `stretch` is given.
+    """
+    stiffness, damping = mechanism.value(effect.stiffness), mechanism.value(effect.damping)
+    if stretch is not None:
+        stiffness, more = (
+            mechanism.value(derivative(effect.law, name), stretch=stretch, rate=rate)
+            for name in ("stretch", "rate")
+        )
+        damping = damping + more
+    return at_least_zero(mechanism, stiffness), at_least_zero(mechanism, damping)
 
 
 def check_law(table: EffectTable, law: Formula | None, location: str) -> None:

@@ -72,3 +72,8 @@ def length(mechanism: Mechanism, vector: Vector) -> Scalar:
         return mechanism.call("abs", vector[0])
     square = mechanism.call("max", dot(vector, vector), mechanism.number(LEAST_SQUARE))
     return mechanism.call("sqrt", square)
+
+
+def at_least_zero(mechanism: Mechanism, value: Scalar) -> Scalar:
+    """max(value, 0)."""
+    return mechanism.call("max", value, mechanism.zero)

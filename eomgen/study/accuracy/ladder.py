@@ -16,6 +16,7 @@ from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy.trial import Setting
+from eomgen.tables.integrators import GENERAL
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
 """How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
@@ -180,12 +181,12 @@ def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
 
 
 def methods_named(names: Sequence[str] | None) -> Sequence[str]:
-    """The methods of these names, in the order of `INTEGRATORS`; if None, all.
+    """The methods of these names, in the order of `INTEGRATORS`; if None, `GENERAL`.
 
     Raises `RunError` for an unknown name, or if there is none.
     """
     if names is None:
-        return tuple(INTEGRATORS)
+        return GENERAL
     if not names:
         raise RunError(f"--methods: names no integrator; known: {', '.join(INTEGRATORS)}")
     for name in names:
