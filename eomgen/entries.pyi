@@ -908,7 +908,7 @@ def Rope(
     from that at the start.
 
     The multiplier is the tension, N. It stays taut even if that becomes negative, as a rod would;
-    with `tension_only` a `spring` is slack then. Where a disc takes it along, each section has
+    a `tether` is slack then. Where a disc takes it along, each section has
     a tension of its own: rows `<name>_1`, `<name>_2`, ….
     """
     ...
@@ -1058,6 +1058,23 @@ def State(
     about: str = ...,
 ) -> Table:
     """A state z of a controller: dz/dt = `rate`, z(0) = `initial`."""
+    ...
+
+def Tether(
+    *,
+    name: str,
+    through: Sequence[Table | Mapping[str, Any]],
+    length: float | str,
+    restitution: float | str = ...,
+) -> Table:
+    """A massless string of fixed `length`, which does not stretch: it keeps its way `through`
+    points, rings and discs from getting longer, see `points of ropes`, and is slack while the way
+    is shorter.
+
+    It is a rigid contact with the gap `length` - way, without friction. Where it becomes taut it
+    pulls with an impulse, and the way shortens at `restitution` times the speed at which it got
+    longer. While it is taut its tension is not negative; it becomes slack where that would be.
+    """
     ...
 
 def Universal(

@@ -181,6 +181,10 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
      'joint = "rail"; low = 0.1; stiffness = 60.0; damping = -0.1; allow_active = true',
      damped("damping")),
     ("joint_stop", "rigid", 'joint = "rail"; low = -0.2; restitution = 0.5', NO_ENERGY),
+    ("tether", "ring",
+     'length = 9.0; restitution = 0.4; through = [{ body = "world", at = <0 3 0> }, '
+     '{ body = "a" }, { body = "b" }]',
+     NO_ENERGY),
     ("contact", "spring and damper",
      f'law = "spring_damper"; against = "plane"; radius = 0.1; damping = 4.0; {GROUND}{LOSSES}',
      damped("damping", "friction")),

@@ -27,6 +27,7 @@ from eomgen.show.style import style, write_figure
 from eomgen.show.view import eye_axes
 
 FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
+ENTRIES = FOLDER.parent / "reference" / "scenes"
 
 ARM = """\
 name = "arm"
@@ -143,6 +144,8 @@ SCENES: Mapping[str, str] = {
         BALL, "contact", 'law = "spring_damper"\nstiffness = 1e3\nagainst = "heights"\n'
         'height = "0.1*sin(5*x)"\nbody = "ball"\nradius = 0.1'),
     "wind": effect(BALL, "drag", 'body = "ball"\nlinear = 0.1\nwind = [3.0, 0.5]'),
+    **{name: (ENTRIES / f"{entry}.toml").read_text("utf-8")
+       for name, entry in (("cord", "rope"), ("belt", "belt"), ("gear", "gear"))},
     "force": effect(ARM, "external_force", 'body = "arm"\nat = [0.3, 0]\nforce = [0, 1.0]'),
 }  # fmt: skip
 LONGER = {"heights": 0.4, "obstacle": 0.3, "attraction": 0.6, "field": 0.8, "wind": 0.8}

@@ -15,10 +15,10 @@ from eomgen.scene.joints import Joint
 MOST_MESSAGES = 10
 TABLES = {"joints": Joint, "effects": Effect, "constraints": AnyConstraint}
 """The tables whose types differ, with the unions of their entries."""
-REMARKS = dict.fromkeys(
-    ("rope", "cable", "string"),
-    ", or a spring with tension_only = true if it may be slack",
-)
+REMARKS = {
+    **dict.fromkeys(("rope", "cable"), ", or a tether if it may be slack"),
+    **dict.fromkeys(("tether", "string", "cord"), ", or a rope if it is always taut"),
+}
 """What else belongs to a word that means a type."""
 
 

@@ -12,8 +12,8 @@ from eomgen.language.base import Table, types_of
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.scene.constraints import RopePoint
 from eomgen.scene.effects.contact_shapes import ContactShape
+from eomgen.scene.effects.through import RopePoint
 from eomgen.scene.kinds import AnyConstraint, Effect, Joint
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.schema import (

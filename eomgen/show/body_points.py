@@ -8,10 +8,11 @@ from statistics import median
 from eomgen.language.formula import Formula
 from eomgen.model.bodies import Body
 from eomgen.model.model import Model
+from eomgen.scene.constraints import ConstraintTable
 from eomgen.scene.effects.base import EffectTable
-from eomgen.scene.effects.elements import Link, Touching
+from eomgen.scene.effects.elements import Disc, Link, Touching
 from eomgen.scene.joints.base import WORLD
-from eomgen.show.effect_elements import elements_of_constraints
+from eomgen.show.effect_elements import discs_of_constraints, elements_of_constraints
 
 DRAWN = (1e-90, 1e90)
 """Only lengths between these, m, are drawn."""
@@ -29,6 +30,7 @@ class BodyPoints:
     spheres  centre and radius of its spheres in contacts
     boxes    centre, half sizes and rounding of its boxes in contacts
     solids   its other shapes in contacts
+    discs    its discs that ropes, belts or gears turn
     """
 
     joints: list[Vector] = field(default_factory=list)
@@ -37,6 +39,7 @@ class BodyPoints:
     spheres: list[tuple[Vector, Formula]] = field(default_factory=list)
     boxes: list[tuple[Vector, Vector, Formula]] = field(default_factory=list)
     solids: list[Touching] = field(default_factory=list)
+    discs: list[Disc] = field(default_factory=list)
 
 
 def points_of(model: Model) -> list[BodyPoints]:
@@ -64,6 +67,8 @@ def points_of(model: Model) -> list[BodyPoints]:
         if isinstance(element, Link):
             for end in (element.start, element.end):
                 add(names[end.body], end.at, "others")
+    for disc in discs_of_constraints(model, 1.0):
+        found[index[disc.body]].discs.append(disc)
     for point in model.points:
         add(model.bodies[point.body].name, point.at, "others")
     for effect in model.effects:
@@ -138,4 +143,5 @@ def _span(model: Model, joints: list[Vector]) -> float:
 
 def _lengths_in_effects(model: Model, points: list[BodyPoints]) -> list[float]:
     found = [length_of(model, r) for own in points for r in own.others]
-    return found + [model.value(x) for effect in model.effects for x in effect.lengths()]
+    listed = (c for c in model.constraints if isinstance(c, ConstraintTable))
+    return found + [model.value(x) for e in (*model.effects, *listed) for x in e.lengths()]

@@ -10,7 +10,7 @@ from eomgen.language.rewriting import constant
 from eomgen.model.bodies import dofs_of
 from eomgen.model.model import Model
 from eomgen.scene.constraints.base import ConstraintTable
-from eomgen.scene.effects.elements import WORLD_INDEX, Element, Vector, Wind
+from eomgen.scene.effects.elements import WORLD_INDEX, Disc, Element, Vector, Wind
 from eomgen.scene.joints.base import WORLD, kinds_of, spatial
 from eomgen.show.arrows import wind_at
 
@@ -32,6 +32,18 @@ def elements_of_constraints(model: Model, size: float) -> Iterable[Element]:
     for constraint in model.constraints:
         if isinstance(constraint, ConstraintTable):
             yield from constraint.elements(layout)
+
+
+def discs_of_constraints(model: Model, size: float) -> Iterable[Disc]:
+    """The discs of bodies that the constraints turn, one for each centre and radius."""
+    layout, seen = _Layout(model, size), set[tuple[str, tuple[float, ...], float]]()
+    for constraint in model.constraints:
+        for disc in constraint.discs(layout) if isinstance(constraint, ConstraintTable) else ():
+            places = (*map(model.value, disc.at),)
+            same = (disc.body, places, round(model.value(disc.radius), 9))
+            if same not in seen:
+                seen.add(same)
+                yield disc
 
 
 class _Layout:
@@ -60,6 +72,20 @@ class _Layout:
     def point(self, name: str) -> tuple[int, Vector]:
         point = next(point for point in self._model.points if point.name == name)
         return point.body, point.at
+
+    def value(self, formula: Formula) -> float:
+        return self._model.value(formula)
+
+    def axle(self, body: str, carrier: str) -> tuple[Vector, Vector] | None:
+        bodies, (k, n) = self._model.bodies, (self.bodies[body], self.bodies[carrier])
+        one, other = (bodies[i] if i >= 0 else None for i in (k, n))
+        if one and one.parent == n:
+            return one.joint.r_child, one.joint.r_parent
+        if other and other.parent == k:
+            return other.joint.r_parent, other.joint.r_child
+        if one and other and one.parent == other.parent:
+            return one.joint.r_child, other.joint.r_child
+        return None
 
     def wheel_axis(self, body: int, at: Vector) -> Vector | None:
         joint, value = self._model.bodies[body].joint, self._model.value

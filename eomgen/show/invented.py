@@ -17,6 +17,7 @@ from eomgen.language.formula import Constant
 from eomgen.language.rewriting import constant, scaled, sum_of, times, total
 from eomgen.model.bodies import Body
 from eomgen.model.model import Model
+from eomgen.scene.effects import elements
 from eomgen.scene.effects.elements import Touching
 from eomgen.scene.joints.base import kinds_of, spatial
 from eomgen.scene.look import Box, Cylinder, Disc, Ellipsoid, Polygon, Rod, Shape, Sphere
@@ -25,6 +26,7 @@ from eomgen.show.colours import shade
 from eomgen.show.joint_axes import slides
 from eomgen.show.outlines import hull
 from eomgen.show.solid import angles_of, rotation_to
+from eomgen.show.symbols import toothed
 
 Array = NDArray[np.float64]
 
@@ -99,7 +101,7 @@ def invented_shapes(
     elif slides(body.joint, model.dimensions):
         shapes = [*_rods(inventor, body, arms, color), *_slider(inventor, body, color)]
     elif not arms:
-        shapes = [*_alone(inventor, body, points, color)]
+        shapes = [] if points.discs else [*_alone(inventor, body, points, color)]
     elif len(arms) == 1 and len(points.joints) == 1 and not _is_thick(model, body, arms[0]):
         shapes = [*_pendulum(inventor, body, arms[0], points.others, color)]
     elif len(arms) == 2 and _is_straight(model, arms):
@@ -108,7 +110,29 @@ def invented_shapes(
         shapes = [*_plate(inventor, body, arms, color)]
     else:
         shapes = [*_rods(inventor, body, arms, color), *_hub(inventor, body, points, arms, color)]
-    return (*shapes, *_barrel(inventor, body, arms, color))
+    discs = (shape for disc in points.discs for shape in _disc(inventor, body, disc, color))
+    return (*discs, *shapes, *_barrel(inventor, body, arms, color))
+
+
+def _disc(inventor: Inventor, body: Body, disc: elements.Disc, color: str) -> Iterator[Shape]:
+    """A disc or a gear, with a mark that shows rotation; in space about the axis of the joint."""
+    model, dark = inventor.model, shade(color)
+    if model.dimensions == 3:
+        if kinds_of(body.joint, 3) == ["revolute"]:
+            axis = np.array(spatial(body.joint.primitives(3)[0].axis))
+            radius = model.value(disc.radius)
+            half = 0.1 * radius * axis / np.linalg.norm(axis)
+            yield _along(disc.at, half, radius, color)
+        return
+    if disc.teeth:
+        size = model.value(disc.radius)
+        outline = [constant(*(size * x for x in p)) for p in toothed(disc.teeth, False, disc.phase)]
+        points = tuple(sum_of(disc.at, point) for point in outline[:-1])
+        yield Polygon(type="polygon", points=points, color=color)
+    else:
+        yield Disc(type="disc", radius=disc.radius, center=disc.at, color=color)
+    end = (total(disc.at[0], times(0.72, disc.radius)), *disc.at[1:])
+    yield Rod(type="rod", start=disc.at, end=end, width=times(0.16, disc.radius), color=dark)
 
 
 def _touching(inventor: Inventor, body: Body, points: BodyPoints, color: str) -> Iterator[Shape]:

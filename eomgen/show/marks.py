@@ -9,13 +9,14 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from eomgen.language.formula import Apply, Constant, Formula
+from eomgen.language.formula import ZERO, Apply, Constant, Formula
 from eomgen.language.rewriting import constant, scaled, sum_of, times
 from eomgen.scene.effects.elements import (
     WORLD_INDEX,
     AtJoint,
     Attachment,
     Attraction,
+    Cord,
     Element,
     Field,
     GroundLine,
@@ -49,6 +50,16 @@ class Between:
     end: Attachment
     radius: Formula
     rest: Formula | None = None
+
+
+@dataclass(frozen=True)
+class Over:
+    """The way of a rope or a belt over points and discs: see `Cord`. Its lines are this way."""
+
+    kind: ClassVar[str] = "over"
+    stops: tuple[Attachment, ...]
+    radii: tuple[Formula, ...]
+    closed: bool
 
 
 @dataclass(frozen=True)
@@ -101,7 +112,7 @@ class Mark:
            things behind all, which a view need not hold
     """
 
-    frame: Between | Along | Turned | Facing | Arrows
+    frame: Between | Over | Along | Turned | Facing | Arrows
     symbol: Symbol
     layer: Literal["fixed", "back", "middle", "front"] = "front"
 
@@ -121,6 +132,13 @@ def _marks(picture: Picture, element: Element) -> Iterator[Mark]:
             yield Mark(between, symbols.link(element.kind, _dimensions(picture)))
             for end in (element.start, element.end):
                 yield Mark(Facing(end, element.radius), symbols.END)
+        case Cord():
+            yield Mark(Over(element.stops, element.radii, element.closed), symbols.CORD)
+            for end, radius in (
+                () if element.closed else zip(element.stops, element.radii, strict=True)
+            ):
+                if end in (element.stops[0], element.stops[-1]) and radius == ZERO:
+                    yield Mark(Facing(end, Constant(0.04 * size)), symbols.END)
         case AtJoint():
             yield from _at_joint(picture, element, picture.joints[element.joint])
         case Support(kind="base"):
@@ -204,6 +222,11 @@ def _round(ball: Round, size: float) -> Iterator[Mark]:
     radius: Formula = Apply("max", (ball.radius, least))
     if isinstance(ball.radius, Constant):
         radius = Constant(max(ball.radius.value, least.value))
+    if ball.kind == "gear":
+        x, y = constant(1.0, 0.0), constant(0.0, 1.0)
+        symbol = symbols.gear(ball.teeth, ball.ring, ball.phase)
+        yield Mark(Turned(at, ball.body, x, y, ball.radius), symbol, "back")
+        return
     if ball.kind == "wheel":
         x, y = _across(ball.axis) if ball.axis else (constant(1.0, 0.0), constant(0.0, 1.0))
         yield Mark(Turned(at, ball.body, x, y, radius), symbols.WHEEL)

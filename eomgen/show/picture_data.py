@@ -49,7 +49,7 @@ def picture_data(picture: Picture) -> tuple[dict[str, Any], Geometry]:
         "symbols": [data(symbol) for symbol in symbols],
         "ends": ends,
         "planes": [data(e) for e in rest if isinstance(e, Plane)],
-        "balls": [data(e) for e in rest if isinstance(e, Round) and e.body < 0],
+        "balls": [data(e) for e in rest if isinstance(e, Round) and e.body < 0 and not e.teeth],
         "winds": [data(without_formula(e)) for e in winds],
         "traces": data(picture.traces),
         "size": picture.size,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant, Formula
 from eomgen.scene.effects.elements import Attachment
 from eomgen.scene.look import number, numbers
-from eomgen.show.marks import Along, Arrows, Between, Facing, Mark, Turned, marks_of
+from eomgen.show.marks import Along, Arrows, Between, Facing, Over, Turned, marks_of
 from eomgen.show.picture import Picture
 from eomgen.show.symbols import Line, numbers_of
 from eomgen.tables.poses import world_points
@@ -18,6 +18,8 @@ from eomgen.tables.poses import world_points
 Array = NDArray[np.float64]
 TAUT = 1e-3
 """A rope is straight if it is shorter than its length at rest by less than this part of it."""
+ROUND = 25
+"""Points of an arc."""
 WIDEST = 0.3
 """Greatest radius of what is between two points relative to their distance."""
 
@@ -59,8 +61,13 @@ class Sight:
 def strokes(sight: Sight) -> Iterator[Stroke]:
     """The lines of all marks that are somewhere."""
     for mark in marks_of(sight.picture):
+        if isinstance(mark.frame, Over):
+            way = _way(sight, mark.frame)
+            for line in mark.symbol if np.isfinite(way).all() else ():
+                yield Stroke(sight.seen(way), line, mark.layer)
+            continue
         with np.errstate(invalid="ignore", divide="ignore"):  # what has no length is left out
-            frames = list(_frames(sight, mark))
+            frames = list(_frames(sight, mark.frame))
         for origin, axes, sag in frames:
             if not (np.isfinite(origin).all() and np.isfinite(axes).all()):
                 continue
@@ -71,9 +78,11 @@ def strokes(sight: Sight) -> Iterator[Stroke]:
                 yield Stroke(sight.seen(points), line, mark.layer)
 
 
-def _frames(sight: Sight, mark: Mark) -> Iterator[tuple[Array, Array, Array]]:
+def _frames(
+    sight: Sight, frame: Between | Along | Turned | Facing | Arrows
+) -> Iterator[tuple[Array, Array, Array]]:
     """The frames of a mark: origin, x, y and z as rows, and what bends x to a parabola."""
-    frame, straight = mark.frame, np.zeros(3)
+    straight = np.zeros(3)
     if isinstance(frame, Arrows):
         vectors = np.array([_three(np.array(numbers(vector))) for vector in frame.vectors])
         longest = float(np.linalg.norm(vectors, axis=1).max())
@@ -98,6 +107,42 @@ def _frames(sight: Sight, mark: Mark) -> Iterator[tuple[Array, Array, Array]]:
         yield origin, radius * np.array([x, y, straight]), straight
     elif isinstance(frame, Facing):
         yield origin, radius * sight.eye, straight
+
+
+def _way(sight: Sight, frame: Over) -> Array:
+    """The points (k, 3) of a way over discs: tangents between them, and arcs on them."""
+    places = [sight.world(stop.body, stop.at) for stop in frame.stops]
+    radii = [number(radius) for radius in frame.radii]
+    if not any(radii):
+        return np.array(places)
+    if frame.closed:
+        places, radii = [*places, places[0]], [*radii, radii[0]]
+    points, before = list[Array](), np.nan
+    first = _tangent(places[-2], places[-1], radii[-2], radii[-1]) if frame.closed else np.nan
+    for k in range(len(places)):
+        after = before
+        if k + 1 < len(places):
+            after = _tangent(places[k], places[k + 1], radii[k], radii[k + 1])
+        came = (first if frame.closed else after) if k == 0 else before
+        points.append(_arc(places[k], radii[k], came, after))
+        before = after
+    return np.concatenate(points)
+
+
+def _tangent(start: Array, end: Array, radius: float, other: float) -> float:
+    """The direction of the tangent from one disc to another, rad; nan if there is none."""
+    x, y = (end - start)[:2]
+    h, square = other - radius, x * x + y * y
+    length = math.sqrt(square - h * h) if square > h * h else math.nan
+    return math.atan2(length * y - h * x, length * x + h * y)
+
+
+def _arc(place: Array, radius: float, came: float, leaves: float) -> Array:
+    """Points of a disc from where a rope comes to it to where it leaves it, by its directions."""
+    turn = (leaves - came) * np.sign(radius) % (2 * math.pi) if radius else 0.0
+    angles = came + np.sign(radius) * np.linspace(0.0, turn, ROUND if turn else 1)
+    normal = np.array([-np.sin(angles), np.cos(angles), np.zeros(len(angles))])
+    return np.asarray(place - radius * normal.T)
 
 
 def _axes(sight: Sight, along: Array, radius: float) -> Array:

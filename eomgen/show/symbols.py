@@ -153,7 +153,34 @@ def at_slider(kind: str, dimensions: int) -> Symbol:
     return (*arrow, *DOT) if kind == "servo" else arrow
 
 
+CORD: Symbol = (Line(((0.0, 0.0), (1.0, 0.0)), 1.3),)
+"""A rope on its way, or a belt."""
+
 # ---- Around a point, in radii ----
+
+
+def toothed(teeth: int, ring: bool = False, phase: float = 0.0) -> Flat:
+    """The outline of a gear of pitch radius 1, with a tooth at the angle `phase`, rad; of a ring,
+    whose teeth are inside, with a gap there.
+    """
+    high, low, pitch = 1 + 1.7 / teeth, 1 - 2.1 / teeth, 2 * math.pi / teeth
+    if ring:
+        low, high = 1 - 1.7 / teeth, 1 + 2.1 / teeth
+    corners = ((-0.3, low), (-0.11, high), (0.11, high), (0.3, low))
+    points = [
+        (radius * math.cos(angle), radius * math.sin(angle))
+        for k in range(teeth)
+        for part, radius in corners
+        for angle in [phase + pitch * (k + part)]
+    ]
+    return tuple((_short(x), _short(y)) for x, y in (*points, points[0]))
+
+
+def gear(teeth: int, ring: bool, phase: float) -> Symbol:
+    """A gear that is no shape of a body; a ring has a rim."""
+    rim = (Line(arc(1 + 5 / teeth), 1.0, 0.6),) if ring else ()
+    return (*rim, Line(toothed(teeth, ring, phase), 1.0, 0.6))
+
 
 DOT = ring(0.15)
 TORSION: Symbol = (

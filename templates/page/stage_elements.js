@@ -57,6 +57,32 @@ const makeElements = (scene, mixed) => {
     },
   };
 
+  // The way of a rope or a belt: tangents between discs, and arcs on them; radii are positive where it goes round
+  // counterclockwise.
+  function way({ stops, radii, closed }, { poses, values }) {
+    const places = stops.map((stop) => place(poses, stop.body, vector(stop.at, values)));
+    const sizes = radii.map((radius) => number(radius, values));
+    if (sizes.every((size) => size === 0)) return places.flat();
+    if (closed) [places, sizes].forEach((list) => list.push(list[0]));
+    const spans = places.slice(1).map((end, k) => {
+      const [x, y] = subtract(end, places[k]);
+      const h = sizes[k + 1] - sizes[k];
+      const length = Math.sqrt(x * x + y * y - h * h);
+      return Math.atan2(length * y - h * x, length * x + h * y);
+    });
+    return places.flatMap((at, k) => {
+      const leaves = spans[k] ?? (closed ? spans[0] : spans[k - 1]);
+      const came = spans[k - 1] ?? (closed ? spans[spans.length - 1] : leaves);
+      const sign = Math.sign(sizes[k]);
+      const turn = ((((leaves - came) * sign) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI);
+      const count = sign && turn ? 24 : 0;
+      return Array.from({ length: count + 1 }, (_, i) => {
+        const angle = came + (count ? (sign * turn * i) / count : 0);
+        return [at[0] + sizes[k] * Math.sin(angle), at[1] - sizes[k] * Math.cos(angle), at[2]];
+      }).flat();
+    });
+  }
+
   // Points of a line of a symbol as pairs of ends, each moved by `spot`.
   const pieces = ({ points, dashed }, values, spot) =>
     (dashed ? lines.dashes : lines.pairs)(points.flatMap((point) => spot(vector(point, values))));
@@ -67,6 +93,13 @@ const makeElements = (scene, mixed) => {
     line.renderOrder = LAYERS[mark.layer];
     painted.push([line, part.ink]);
     scene.add(line);
+    if (mark.kind === "over") {
+      return (now) => {
+        const points = way(mark, now);
+        line.visible = points.every(Number.isFinite);
+        if (line.visible) line.setPoints(lines.pairs(points));
+      };
+    }
     const stiff = mark.kind !== "arrows" && !mark.rest && part.points.flat().every((x) => typeof x === "number");
     if (stiff) line.setPoints(pieces(part, [], (point) => point));
     return (now) => {

@@ -17,7 +17,7 @@ from eomgen.scene.constraints.loop import LoopJoint, loop_joint
 from eomgen.scene.constraints.point_on import PointOn
 from eomgen.scene.constraints.pulley import Pulley
 from eomgen.scene.constraints.rolling import Rolling
-from eomgen.scene.constraints.rope import Rope, RopePoint
+from eomgen.scene.constraints.rope import Rope
 
 AnyConstraint = Annotated[
     Belt | Coupling | Distance | Equation | Gear | KnifeEdge | PointOn | Pulley | Rolling | Rope,
@@ -40,7 +40,6 @@ __all__ = [
     "Pulley",
     "Rolling",
     "Rope",
-    "RopePoint",
     "Row",
     "loop_joint",
 ]

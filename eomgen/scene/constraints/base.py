@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
-from eomgen.scene.effects.elements import Element, Layout
+from eomgen.scene.effects.elements import Disc, Element, Layout
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,10 @@ class ConstraintTable(EffectTable):
 
     def elements(self, layout: Layout) -> Iterable[Element]:
         """What pictures show of it; of most constraints nothing."""
+        return ()
+
+    def discs(self, layout: Layout) -> Iterable[Disc]:
+        """The discs of bodies that it turns, for pictures of bodies without shapes."""
         return ()
 
     def rows(self, mechanism: Linkage) -> Iterable[Row]:

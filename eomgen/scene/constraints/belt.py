@@ -1,12 +1,16 @@
 """A belt between two discs."""
 
+from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from eomgen.language.formula import Formula
+from eomgen.language.formula import Constant, Formula
 from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.rewriting import times
 from eomgen.scene.constraints.gear import Transmission
+from eomgen.scene.effects.elements import Attachment, Cord, Disc, Layout, Round
+from eomgen.scene.joints.base import WORLD
 
 
 class Belt(Transmission):
@@ -34,6 +38,23 @@ radius_2 = 0.2
     radius_1: Quantity = quantity("m", "radius of the disc of body_1", "positive")
     radius_2: Quantity = quantity("m", "radius of the disc of body_2", "positive")
     crossed: bool = Field(default=False, strict=True, description="whether it crosses itself")
+
+    def elements(self, layout: Layout) -> Iterator[Cord | Round]:
+        """The belt, in the plane, and a disc of the world."""
+        wheels = self.wheels(layout) if layout.dimensions == 2 else ()
+        stops = tuple(Attachment(layout.bodies[wheel.body], wheel.at) for wheel in wheels)
+        if not stops:
+            return
+        if self.body_2 == WORLD:
+            yield Round("ball", self.name, stops[1].body, stops[1].at, self.radius_2)
+        sign = -1.0 if self.crossed else 1.0
+        yield Cord(self.name, stops, (self.radius_1, times(sign, self.radius_2)), closed=True)
+
+    def discs(self, layout: Layout) -> Iterator[Disc]:
+        """The discs of bodies."""
+        for wheel in self.wheels(layout):
+            if wheel.body != WORLD:
+                yield Disc(wheel.body, wheel.at, Constant(wheel.radius))
 
     def opposed(self) -> bool:
         """A crossed one."""

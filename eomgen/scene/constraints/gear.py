@@ -1,5 +1,6 @@
 """Gears: two bodies that turn each other at a fixed ratio."""
 
+import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
 
@@ -12,7 +13,9 @@ from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.rewriting import difference, total
 from eomgen.scene.constraints.base import ConstraintTable, Given, Linkage, Row, Ways
 from eomgen.scene.constraints.formula import position_row
+from eomgen.scene.constraints.meshing import Wheel, meshed, teeth_of
 from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.elements import Disc, Element, Layout, Round
 from eomgen.scene.joints.base import WORLD
 
 ONE = Constant(1.0)
@@ -46,6 +49,13 @@ class Transmission(ConstraintTable):
         if self.body_1 == self.body_2:
             raise wrong("body_2", "is also body_1; name another body")
         return self
+
+    def wheels(self, layout: Layout) -> list[Wheel]:
+        """Both wheels as pictures show them."""
+        own, ratio = map(layout.value, self.weights())
+        radius = None if self.weights()[0] == ONE else own
+        bodies = self.body_1, self.body_2
+        return meshed(layout, bodies, self.carrier or WORLD, ratio / own, radius, self.opposed())
 
     def opposed(self) -> bool:
         """Whether the bodies turn in opposite senses."""
@@ -158,6 +168,33 @@ teeth_2 = 36
             if getattr(self, key) is None:
                 raise wrong(key, "is missing; give that of both gears")
         return self
+
+    def toothed(self, layout: Layout) -> Iterator[tuple[Wheel, int, float]]:
+        """Both gears with their numbers of teeth, and where one has a tooth, or a ring a gap: where
+        the second angle is 0 a tooth of one is in a gap of the other.
+        """
+        given = (self.teeth_1, self.teeth_2)
+        own, ratio = map(layout.value, self.weights())
+        teeth = teeth_of([layout.value(x) for x in given if x is not None], ratio / own)
+        start = (layout.value(self.phase), 0.0)
+        for k, wheel in enumerate(self.wheels(layout)):
+            half = math.pi / teeth[1] if k == 1 and self.opposed() else 0.0
+            yield wheel, teeth[k], wheel.meets - start[k] + half
+
+    def elements(self, layout: Layout) -> Iterator[Element]:
+        """Rings, and gears of the world."""
+        for wheel, teeth, phase in self.toothed(layout) if layout.dimensions == 2 else ():
+            if wheel.ring or wheel.body == WORLD:
+                body, radius = layout.bodies[wheel.body], Constant(wheel.radius)
+                yield Round(
+                    "gear", self.name, body, wheel.at, radius, None, None, teeth, wheel.ring, phase
+                )
+
+    def discs(self, layout: Layout) -> Iterator[Disc]:
+        """The other gears."""
+        for wheel, teeth, phase in self.toothed(layout):
+            if not (wheel.ring or wheel.body == WORLD):
+                yield Disc(wheel.body, wheel.at, Constant(wheel.radius), teeth, phase)
 
     def opposed(self) -> bool:
         """External gears."""

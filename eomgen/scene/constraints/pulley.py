@@ -7,8 +7,9 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Quantity, Vector, quantity
-from eomgen.scene.constraints.rope import Sense, Taut
-from eomgen.scene.constraints.spans import Stop
+from eomgen.scene.constraints.rope import Taut
+from eomgen.scene.effects.spans import Stop
+from eomgen.scene.effects.through import Sense
 
 
 class Pulley(Taut):

@@ -1,70 +1,19 @@
 """A rope of fixed length: through points and rings, over discs, and wound on drums."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import PrivateAttr
 
 from eomgen.base.errors import SceneError
-from eomgen.language.base import Identifier, Table
 from eomgen.language.formula import ZERO, Apply, Constant, Formula
-from eomgen.language.quantity import Quantity, Vector, quantity, with_components
-from eomgen.language.rewriting import difference
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.rewriting import difference, times
 from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row, Ways
-from eomgen.scene.constraints.spans import Stop, margin_of, section_of, spans_of, way_of
-from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.elements import Disc, Element, Layout
+from eomgen.scene.effects.spans import Stop, drawn, margin_of, section_of, spans_of, way_of
+from eomgen.scene.effects.through import Through
 from eomgen.scene.joints.base import WORLD
-
-MOST_STOPS = 100
-Sense = Literal["clockwise", "counterclockwise"]
-
-
-class RopePoint(Table):
-    """What a rope is held by or runs through: a point or a ring, or with `radius` a disc about it,
-    which it goes round in the sense `winds`, seen along the rope from its first end to its last.
-
-    The rope slides through rings and over discs without friction. A disc that `grips` takes it
-    along without slip; so does a disc at an end, a drum, on which it is wound.
-    """
-
-    example: ClassVar[str] = """
-[[constraints]]
-type = "rope"
-name = "hoist"
-
-[[constraints.through]]
-body = "hand"
-
-[[constraints.through]]
-body = "world"
-at = [0.4, 1.0]
-radius = 0.1
-winds = "clockwise"
-
-[[constraints.through]]
-body = "world"
-at = [0.9, -0.5]
-"""
-
-    body: Identifier = Field(description="body it is fixed to, or 'world'")
-    at: Vector = quantity(
-        "m", "the point, from the centre of mass", default=(), validate_default=False
-    )
-    radius: Quantity | None = quantity("m", "radius of the disc", "positive", default=None)
-    winds: Sense | None = Field(default=None, description="sense in which the rope goes round it")
-    grips: bool = Field(
-        default=False, strict=True, description="whether the disc takes the rope without slip"
-    )
-
-    @model_validator(mode="after")
-    def _keys_fit(self) -> Self:
-        if self.radius is None and self.winds is not None:
-            raise wrong("winds", "is that of a disc; give its radius, or leave it out")
-        if self.radius is None and self.grips:
-            raise wrong("grips", "is that of a disc; give its radius, or leave it out")
-        if self.radius is not None and self.winds is None:
-            raise wrong("winds", "is missing; say how the rope goes round: clockwise or not")
-        return self
 
 
 class Taut(ConstraintTable):
@@ -117,6 +66,21 @@ class Taut(ConstraintTable):
             copy._lengths = (*copy._lengths[:-1], last)
         return copy
 
+    def lengths(self) -> tuple[Formula, ...]:
+        """That of a span of each section."""
+        parts = zip(self._lengths, self._sections(), strict=False)
+        return tuple(times(1 / (last - first), length) for length, (first, last) in parts)
+
+    def elements(self, layout: Layout) -> Iterator[Element]:
+        """Its way."""
+        yield from drawn(self.name, self.stops(), None, layout)
+
+    def discs(self, layout: Layout) -> Iterator[Disc]:
+        """Those of bodies."""
+        for stop in self.stops():
+            if stop.radius is not None and stop.body != WORLD:
+                yield Disc(stop.body, stop.at, stop.radius)
+
     def _sections(self) -> list[tuple[int, int]]:
         """The first and the last stop of each section: what takes the rope along divides it."""
         count = len(self.stops())
@@ -150,7 +114,7 @@ class Taut(ConstraintTable):
             yield Row(mechanism.value(length) - taken, loads, margin=margin)
 
 
-class Rope(Taut):
+class Rope(Through, Taut):
     """A massless rope of fixed `length` that is taut along its way `through` points, rings and
     discs: see `points of ropes`. Its spans are straight, and discs are left along tangents, in the
     plane. A load on a rope through a ring, a block and tackle, a string that winds on a drum.
@@ -161,7 +125,7 @@ class Rope(Taut):
     from that at the start.
 
     The multiplier is the tension, N. It stays taut even if that becomes negative, as a rod would;
-    with `tension_only` a `spring` is slack then. Where a disc takes it along, each section has
+    a `tether` is slack then. Where a disc takes it along, each section has
     a tension of its own: rows `<name>_1`, `<name>_2`, ….
     """
 
@@ -176,49 +140,17 @@ through = [
     { body = "world", at = [0.9, -0.5] },
 ]
 """
-    anchor_fields = ("through",)
-
     type: Literal["rope"]
-    through: Annotated[tuple[RopePoint, ...], Field(min_length=2, max_length=MOST_STOPS)] = Field(
-        description="what it is held by and runs through, from end to end"
-    )
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Check points, and that discs are in the plane; an end on a disc is on a drum."""
-        through = []
-        for i, point in enumerate(self.through):
-            at = with_components(point.at, ZERO, dimensions, f"{location}.through[{i}].at")
-            if point.radius is not None and dimensions == 3:
-                raise SceneError(
-                    f"{location}.through[{i}].radius: a rope goes round discs in the plane only; "
-                    "in space leave it out: the rope runs through a ring"
-                )
-            drum = point.radius is not None and i in (0, len(self.through) - 1)
-            if drum and self.length is not None:
-                raise SceneError(
-                    f"{location}.length: a rope that ends on a drum, through[{i}], has the length "
-                    "of the start; leave it out"
-                )
-            through.append(point.replaced(at=at, grips=point.grips or drum))
-        return self.replaced(through=tuple(through))
-
-    def from_centres(self, centres: Mapping[str, tuple[Formula, ...]]) -> Mapping[str, Any]:
-        """Its points from the centres of mass."""
-        return {
-            "through": tuple(
-                point.replaced(
-                    at=tuple(
-                        difference(r, c) for r, c in zip(point.at, centres[point.body], strict=True)
-                    )
-                )
-                if point.body in centres
-                else point
-                for point in self.through
+        """Check its points; one that ends on a drum has no length of its own."""
+        checked = super().checked(dimensions, location)
+        ends = (0, len(self.through) - 1)
+        drums = [i for i in ends if self.through[i].radius is not None]
+        if drums and self.length is not None:
+            raise SceneError(
+                f"{location}.length: a rope that ends on a drum, through[{drums[0]}], has the "
+                "length of the start; leave it out"
             )
-        }
-
-    def stops(self) -> tuple[Stop, ...]:
-        """Its points."""
-        return tuple(
-            Stop(p.body, p.at, p.radius, p.winds != "clockwise", p.grips) for p in self.through
-        )
+        through = [p.replaced(grips=p.grips or i in drums) for i, p in enumerate(checked.through)]
+        return checked.replaced(through=tuple(through))

@@ -22,6 +22,7 @@ from eomgen.scene.effects.pd import Pd
 from eomgen.scene.effects.pid import Pid
 from eomgen.scene.effects.sampled_controller import SampledController
 from eomgen.scene.effects.spring import Spring
+from eomgen.scene.effects.tether import Tether
 
 Effect = Annotated[
     Gravity
@@ -41,7 +42,8 @@ Effect = Annotated[
     | Pid
     | PointGravity
     | SampledController
-    | Spring,
+    | Spring
+    | Tether,
     Field(discriminator="type"),
 ]
 """Any effect of a scene; its `type` selects the class."""
@@ -66,4 +68,5 @@ __all__ = [
     "PointGravity",
     "SampledController",
     "Spring",
+    "Tether",
 ]

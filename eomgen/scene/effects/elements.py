@@ -48,6 +48,14 @@ class Layout(Protocol):
     def point(self, name: str) -> tuple[int, Vector]:
         """The body of a named point, and where on it."""
 
+    def value(self, formula: Formula) -> float:
+        """The value of a quantity at the scene's parameters."""
+
+    def axle(self, body: str, carrier: str) -> tuple[Vector, Vector] | None:
+        """The point about which a body turns on another one, on it and on the other one; None if
+        they are not joined, and neither are both to a third one.
+        """
+
     def wheel_axis(self, body: int, at: Vector) -> Vector | None:
         """The axis about which a body rotates if it does so about a point of it; () in the plane,
         None if it does not.
@@ -72,6 +80,19 @@ class Link:
     end: Attachment
     rest: Formula | None
     radius: Formula
+
+
+@dataclass(frozen=True)
+class Cord:
+    """A rope or a belt over `stops`: points, and discs about them with `radii`, m: positive if it
+    goes round them counterclockwise, 0 for points. A `closed` one goes on to the first one.
+    """
+
+    kind: ClassVar[str] = "cord"
+    effect: str
+    stops: tuple[Attachment, ...]
+    radii: tuple[Formula, ...]
+    closed: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,15 +123,33 @@ class Round:
     wheel     that of a contact whose body rotates about it: `axis` is its axis in the body's axes;
               None in the plane
     obstacle  that of a force field, which acts within `reach` of its surface
+    gear      a ring with teeth inside, or a gear of the world; a tooth, or a gap of a ring, is at
+              the angle `phase` from the body's x axis, rad
     """
 
-    kind: Literal["ball", "wheel", "obstacle"]
+    kind: Literal["ball", "wheel", "obstacle", "gear"]
     effect: str
     body: int
     at: Vector
     radius: Formula
     reach: Formula | None = None
     axis: Vector | None = None
+    teeth: int = 0
+    ring: bool = False
+    phase: float = 0.0
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A disc of a body that a rope, a belt or a gear turns. With `teeth` it is a gear, with a tooth
+    at the angle `phase` from the body's x axis, rad.
+    """
+
+    body: str
+    at: Vector
+    radius: Formula
+    teeth: int = 0
+    phase: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -245,7 +284,18 @@ class Support:
 
 
 Element = (
-    Link | AtJoint | Round | Plane | Heights | Field | Wind | Attraction | Pull | Weight | Support
+    Link
+    | Cord
+    | AtJoint
+    | Round
+    | Plane
+    | Heights
+    | Field
+    | Wind
+    | Attraction
+    | Pull
+    | Weight
+    | Support
 )
 
 

@@ -6,14 +6,23 @@ the tangent point is c - ρ n. From one disc to the next d = c' - c = L u + h n 
 the span is L = sqrt(d·d - h²).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.language.formula import Formula
+from eomgen.language.formula import ZERO, Formula
+from eomgen.language.rewriting import times
 from eomgen.scalars import exact
-from eomgen.scene.constraints.base import Linkage
-from eomgen.scene.effects.base import Load, Scalar, Vector
-from eomgen.scene.effects.vectors import dot, negative, sub
+from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.elements import (
+    WORLD_INDEX,
+    Attachment,
+    Cord,
+    Element,
+    Layout,
+    Link,
+    Round,
+)
+from eomgen.scene.effects.vectors import dot, nearest_square, negative, sub
 
 
 @dataclass(frozen=True)
@@ -31,6 +40,23 @@ class Stop:
     grips: bool = False
 
 
+def drawn(
+    effect: str, stops: Sequence[Stop], rest: Formula | None, layout: Layout
+) -> Iterator[Element]:
+    """What pictures show of a rope over stops, which hangs down if it is longer than its way and
+    runs between two points, and of the discs of the world.
+    """
+    places = [Attachment(layout.bodies[stop.body], stop.at) for stop in stops]
+    for stop, place in zip(stops, places, strict=True):
+        if stop.radius is not None and place.body == WORLD_INDEX:
+            yield Round("ball", effect, place.body, place.at, stop.radius)
+    if len(stops) == 2 and not any(stop.radius for stop in stops):
+        yield Link("rope", effect, places[0], places[1], rest, layout.symbol)
+        return
+    radii = (ZERO if s.radius is None else times(1.0 if s.left else -1.0, s.radius) for s in stops)
+    yield Cord(effect, tuple(places), tuple(radii))
+
+
 @dataclass(frozen=True)
 class Span:
     """A straight part: its length, m, its unit direction, world axes, and the square of its length
@@ -42,22 +68,25 @@ class Span:
     share: Scalar | None = None
 
 
-def spans_of(mechanism: Linkage, stops: Sequence[Stop]) -> list[Span]:
-    """The spans between stops."""
+def spans_of(mechanism: Mechanism, stops: Sequence[Stop], *, near: bool = False) -> list[Span]:
+    """The spans between stops. Points that may come `near` each other keep a direction there."""
     centres = [mechanism.position(stop.body, _at(mechanism, stop)) for stop in stops]
     radii = [_signed(mechanism, stop) for stop in stops]
     found = []
     for k in range(len(stops) - 1):
         d = mechanism.called("d", *sub(centres[k + 1], centres[k]))
-        found.append(_span(mechanism, d, radii[k], radii[k + 1]))
+        square = dot(d, d)
+        if near:
+            square = mechanism.call("max", square, nearest_square(mechanism))
+        found.append(_span(mechanism, d, square, radii[k], radii[k + 1]))
     return found
 
 
-def _at(mechanism: Linkage, stop: Stop) -> Vector:
+def _at(mechanism: Mechanism, stop: Stop) -> Vector:
     return tuple(map(mechanism.value, stop.at))
 
 
-def _signed(mechanism: Linkage, stop: Stop) -> Scalar | None:
+def _signed(mechanism: Mechanism, stop: Stop) -> Scalar | None:
     """ρ of a disc; None for a point."""
     if stop.radius is None:
         return None
@@ -65,9 +94,12 @@ def _signed(mechanism: Linkage, stop: Stop) -> Scalar | None:
     return radius if stop.left else -radius
 
 
-def _span(mechanism: Linkage, d: Vector, start: Scalar | None, end: Scalar | None) -> Span:
-    """The tangent of two discs; points are discs without a radius."""
-    square = dot(d, d)
+def _span(
+    mechanism: Mechanism, d: Vector, square: Scalar, start: Scalar | None, end: Scalar | None
+) -> Span:
+    """The tangent of two discs whose centres are apart by d, with |d|² = `square`; points are discs
+    without a radius.
+    """
     if start is None and end is None:
         (length,) = mechanism.called("s", mechanism.call("sqrt", square))
         return Span(length, mechanism.called("u", *(x / length for x in d)))
@@ -80,12 +112,12 @@ def _span(mechanism: Linkage, d: Vector, start: Scalar | None, end: Scalar | Non
     return Span(length, mechanism.called("u", *along), left / square)
 
 
-def _angle(mechanism: Linkage, one: Vector, other: Vector) -> Scalar:
+def _angle(mechanism: Mechanism, one: Vector, other: Vector) -> Scalar:
     """The angle from one direction to another, in (-π, π], rad."""
     return mechanism.call("atan2", one[0] * other[1] - one[1] * other[0], dot(one, other))
 
 
-def _arc(mechanism: Linkage, stop: Stop, before: Span, after: Span) -> Scalar:
+def _arc(mechanism: Mechanism, stop: Stop, before: Span, after: Span) -> Scalar:
     """The arc on a disc between two spans, less than a turn, m."""
     u, w = before.direction, after.direction
     one, other = (u, w) if stop.left else (w, u)
@@ -95,7 +127,7 @@ def _arc(mechanism: Linkage, stop: Stop, before: Span, after: Span) -> Scalar:
     return mechanism.value(stop.radius) * turn
 
 
-def way_of(mechanism: Linkage, stops: Sequence[Stop], spans: Sequence[Span]) -> Scalar:
+def way_of(mechanism: Mechanism, stops: Sequence[Stop], spans: Sequence[Span]) -> Scalar:
     """The length of spans and of the arcs on the discs between them, m."""
     total = spans[0].length
     for stop, before, after in zip(stops[1:-1], spans, spans[1:], strict=False):
@@ -106,7 +138,7 @@ def way_of(mechanism: Linkage, stops: Sequence[Stop], spans: Sequence[Span]) -> 
 
 
 def margin_of(
-    mechanism: Linkage,
+    mechanism: Mechanism,
     stops: Sequence[Stop],
     spans: Sequence[Span],
     directions: Sequence[tuple[float, ...]],
@@ -131,7 +163,7 @@ def margin_of(
 
 
 def section_of(
-    mechanism: Linkage,
+    mechanism: Mechanism,
     stops: Sequence[Stop],
     spans: Sequence[Span],
     angles: Mapping[str, Scalar],
