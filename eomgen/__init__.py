@@ -11,6 +11,7 @@ from eomgen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
+    from eomgen.api.certifying import certify
     from eomgen.api.controllers import Controller
     from eomgen.api.derivation import Derivation
     from eomgen.api.deriving import derive
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
     from eomgen.base.errors import EomgenError, RunError, SceneError
+    from eomgen.results.enclosed import Enclosure
     from eomgen.results.fitted import Fit
     from eomgen.results.module import Module
     from eomgen.scene.built_in import built_in_names
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Controller",
     "Derivation",
+    "Enclosure",
     "Ensemble",
     "EomgenError",
     "Fit",
@@ -53,6 +56,7 @@ __all__ = [
     "arithmetic",
     "built_in_names",
     "casadi_functions",
+    "certify",
     "check",
     "derive",
     "effects",
@@ -80,6 +84,8 @@ __all__ = [
 _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
+    "certify": "api.certifying",
+    "Enclosure": "results.enclosed",
     "Derivation": "api.derivation",
     "Controller": "api.controllers",
     "derive": "api.deriving",

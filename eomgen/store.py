@@ -50,6 +50,7 @@ AFTER = (
         "sweep",
         "show",
         "exports",
+        "certified",
         "results",
     ),
     *("api", "commands", "__main__.py", "__init__.py"),
@@ -59,6 +60,8 @@ LIBRARIES = (
     *("gmpy2", "jinja2", "markupsafe", "mpmath", "numpy", "pydantic", "pydantic_core", "sympy"),
 )
 """Libraries that are loaded to generate code, except those for type annotations alone."""
+IF_THERE = ("python-flint",)
+"""Libraries that SymPy loads where they are installed."""
 
 
 def entries_of(part: str = "") -> Entries | None:
@@ -295,7 +298,9 @@ def this_program() -> str:
 def _generator_digest() -> bytes:
     """A digest of all that generates code: Python, libraries, this program and its templates."""
     python = (platform.python_implementation(), platform.python_version(), platform.machine())
-    digest = hashlib.sha256(repr((python, [_version(name) for name in LIBRARIES])).encode())
+    digest = hashlib.sha256(
+        repr((python, [_version(name) for name in (*LIBRARIES, *IF_THERE)])).encode()
+    )
     _add(digest, PACKAGE, _sources())
     for name in ("c", "javascript", "python"):
         _add(digest, templates_folder(), _files(templates_folder() / name, ".jinja"))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # not imported here: the process that deals out tests runs no
 
     from eomgen.native.compiler import Compiler
 
+os.environ.setdefault("SYMPY_GROUND_TYPES", "gmpy")  # as for users without python-flint
 TOGETHER = {
     "closed": "generated handout identities pivots program routes".split(),
     "effects": "absence bookkeeping".split(),

@@ -17,6 +17,7 @@ FLOORS = (
     "language",
     "subset",
     "program",
+    "certified",
     "engine",
     "scene.joints",
     "scene.effects",

@@ -69,6 +69,18 @@ def check_bound(value: float, argument: str) -> None:
         raise RunError(f"{argument}: {value:g} ulps is not a bound; give 0.5 or more")
 
 
+def check_radius(value: float, argument: str) -> None:
+    """Raise `RunError` for a radius that no box has."""
+    if not 0 < value < math.inf:
+        raise RunError(f"{argument}: {value:g} is not a positive radius")
+
+
+def check_rows(value: int, argument: str) -> None:
+    """Raise `RunError` for a number of rows without a first and a last."""
+    if not 2 <= value <= MOST_STATES:
+        raise RunError(f"{argument}: {value} is not a number of rows from 2 to {MOST_STATES}")
+
+
 def names_in(text: str) -> tuple[str, ...]:
     """The names in a text, between commas."""
     return tuple(filter(None, (word.strip() for word in text.split(","))))
@@ -506,6 +518,30 @@ class FitOptions(Started, Constants):
         help="auto: compute in compiled C code if that pays; numpy: never; c: always",
         value="NAME",
         choices=BACKENDS,
+    )
+
+
+@dataclass(frozen=True)
+class CertifyOptions(Started, Constants):
+    """The options of `certify`."""
+
+    source: "Source | Run"
+    _: KW_ONLY
+    tolerance: float = option(
+        1e-9, "greatest radius of a state, in its SI unit", check=check_radius
+    )
+    t_end: float | None = option(None, "end time", "s", OWN, check=check_time)
+    samples: int = option(101, "number of rows", check=check_rows)
+    inputs: "Inputs | None" = _inputs(
+        "constant values, by name; others have their defaults", "constant value of an input"
+    )
+    uncertain: "Values | None" = option(
+        None,
+        "how far parameters, or states at the start, may lie from their values, by name: the "
+        "boxes hold all of these motions",
+        help="how far a parameter, or a state at the start, may lie from its value",
+        value="NAME=X",
+        count="many",
     )
 
 

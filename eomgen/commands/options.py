@@ -195,6 +195,13 @@ class Matrices(Forced):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Boxes(Forced):
+    """Where `certify` writes."""
+
+    output: Path | None = _file("write all rows to FILE.csv or FILE.json")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Generation(Forced):
     """The options of `generate`."""
 

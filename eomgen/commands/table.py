@@ -13,7 +13,7 @@ from eomgen.commands.usage import add_options
 
 Arguments = argparse.Namespace
 AddOptions = Callable[[argparse.ArgumentParser], None]
-Takes = Literal["scene", "scenes", "run", ""]
+Takes = Literal["scene", "scenes", "run", "either", ""]
 
 DERIVED = "what was derived is kept for the next call"
 TAKEN = {
@@ -25,6 +25,7 @@ TAKEN = {
         None,
         "file that simulate wrote, .npz or .csv; or a scene, which is simulated first",
     ),
+    "either": ("scene", "SCENE", None, "file or built-in name; or FILE.npz, a run"),
 }
 """First arguments: destination, name, how many, and help."""
 
@@ -230,6 +231,15 @@ _ALL = (
         "eomgen linearise cart_pole --state theta_deg=180 -o cart_pole.npz",
         options=(api.PointOptions, api.Routed, own.Matrices),
         kept=DERIVED,
+    ),
+    Command(
+        "certify",
+        "certifying:certify",
+        "prove boxes that hold a motion, or bounds of a run's error",
+        "eomgen certify double_pendulum --tolerance 1e-12",
+        "either",
+        (api.CertifyOptions, api.Routed, own.Boxes),
+        DERIVED,
     ),
     Command(
         "fit",

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from languages import Given, results
+from smooth_program import START, STATES, VALUES, everything
 
 import eomgen
 from eomgen.base.errors import RunError
@@ -21,7 +22,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.native import taylor
 from eomgen.native.library import compiled_library
 from eomgen.program.program import Output, Program, finish, interpret
-from eomgen.program.tape import FUNCTIONS, TIME, Node, Stage, Tape
+from eomgen.program.tape import FUNCTIONS, TIME, Stage, Tape
 from eomgen.program.taylor import (
     NoSeriesError,
     Quotient,
@@ -45,9 +46,6 @@ from eomgen.subset.text import Text
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 ORDER, LATER = 12, 1e-3
-STATES = ("a", "b", "c", "d")
-START = {"a": 0.3, "b": -0.4, "c": 0.7, "d": 1.2}
-VALUES = {"p": 1.3, "u": -0.6}
 DRIVEN = """
 name = "driven"
 dimensions = 2
@@ -62,26 +60,6 @@ child = "bead"
 axis = [1, 0]
 coordinate = "x"
 """
-
-
-def everything() -> Program:
-    """A program with all operations and functions that have a series, in several uses."""
-    tape = Tape()
-    t, u = tape.input(TIME, Stage.INPUTS), tape.input("u", Stage.INPUTS)
-    p = tape.input("p", Stage.PARAMETERS)
-    a, b, c, d = (tape.input(name, Stage.POSITIONS) for name in STATES)
-    two = tape.constant(2.0)
-
-    def of(function: str, *nodes: Node) -> Node:
-        return tape.apply(function, *nodes)
-
-    both = of("sin", a * t) * of("cos", a * t) + of("sin", b) - of("cos", d) * p
-    arcs = of("asin", a) + of("acos", b) - of("atan", c) + of("atan2", b, d) - of("atan2", a, p)
-    mixed = (of("exp", a * b) - of("log", d) * u) / (d * d + p)
-    steep = of("tan", b) + of("tanh", c) * of("sqrt", d) / p - p / d + of("atan2", u, c)
-    rates = [both - mixed, arcs * c, steep - both * both, -(mixed * t) + two / (c * p)]
-    nodes = tuple(node.index for node in rates)
-    return finish(tape, {"derivative": Output((4,), nodes)}, ())
 
 
 def residual(program: Program, system: Recurrences) -> float:
