@@ -147,6 +147,8 @@ def _check_smooth(module: GeneratedModule, problem: Problem) -> None:
     """Raise `RunError` for what has no proof."""
     if problem.contacts is not None:
         raise RunError("certify: rigid contacts strike, which has no proof yet")
+    if problem.sampling is not None:
+        raise RunError("certify: controllers that sample have no proof yet; leave them out")
     if problem.projection is not None:
         raise RunError(
             "certify: the constraints of this scene have no closed form, and motions that are "

@@ -246,6 +246,27 @@ def test_the_last_term_of_the_derivative_is_that_of_all_of_the_step() -> None:
         )
 
 
+def test_the_enclosure_has_all_of_its_last_term_and_a_solution_in_it() -> None:
+    """Of an oscillator with a term of order 2, which is most of it; and of a' = a², which is
+    infinite at t = 1: beyond that nothing is found.
+    """
+    motion, fixed = oscillator()
+    h = 0.1
+    with precision(SHORT):
+        low, _ = motion.series(fixed, ball(0.0), [ball(1.0), ball(0.0)], 2)
+        held = steps._enclosure(motion, fixed, ball(h / 2, h / 2), low, ball(h))
+    assert held is not None
+    assert held[0].contains(exactly(mp.cos(3 * mp.mpf(h))))
+    tape = Tape()
+    a = tape.input("a", Stage.POSITIONS)
+    square = Motion.of(finish(tape, {"derivative": Output((1,), ((a * a).index,))}, ()), ("a",))
+    for length, found in ((0.3, True), (1.1, False)):
+        with precision(SHORT):
+            low, _ = square.series([], ball(0.0), [ball(1.0)], 8)
+            box = steps._enclosure(square, [], ball(length / 2, length / 2), low, ball(length))
+        assert (box is not None) == found
+
+
 def test_a_set_is_held_with_any_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing depends on how well axes are made orthogonal."""
     rows = [[1.0, 0.3], [-0.2, 0.5]]
