@@ -384,7 +384,7 @@ const player = (() => {
     keep, play: () => setPlaying(!clock.playing), back: () => step(-1), forth: () => step(1), restart: reset,
     closer: () => zoom(1.25), farther: () => zoom(0.8), fit: view(stage.fit),
     "save-svg": () => downloads.saveText(`${downloads.fileName(DATA.name)}.svg`, stage.toSvg(), "image/svg+xml"),
-    "mode-replay": () => setMode("replay"), "mode-live": () => { if (!isLive()) { setMode("live"); setPlaying(true); } },
+    "mode-replay": () => setMode("replay"), "mode-live": () => { if (!isLive()) { setMode("live"); restartPlots(); setPlaying(true); } },
   };
   for (const [id, action] of Object.entries(actions)) byId(id).addEventListener("click", action);
   slider.addEventListener("input", () => goTo(Number(slider.value)));

@@ -8,6 +8,7 @@ const makeStage = (canvas, mechanism) => {
   const view = makeView(canvas);
   const DEEP = 60; // the depth that is seen, in heights of the view
   const [LIGHT, AMBIENT] = [2.1, 1.75];
+  const FAINT = 0.3; // of the bodies of another run
   const NEAR = 14; // a pointer that misses a body by so many pixels still takes it
   const stage = { view, failed: "" };
 
@@ -45,7 +46,6 @@ const makeStage = (canvas, mechanism) => {
   const world = makeWorld(scene, mixed);
   const elements = makeElements(scene, mixed);
   const traces = makeTraces(scene, () => paper);
-  const ghosts = makeGhosts(scene, () => paper);
   const marks = makeMarks(scene, () => paper, mixed);
   const arrows = makeArrows(scene, mechanism);
   const shadow = new THREE.MeshBasicMaterial({ depthWrite: false });
@@ -65,55 +65,36 @@ const makeStage = (canvas, mechanism) => {
     for (const part of [world, ghosts, elements, traces, marks]) part.paint();
   };
 
-  // ---- Bodies: rebuilt when a parameter changes their shapes ----
+  // ---- Bodies, their shadows, and the faint ones of another run ----
 
-  const bodies = drawing.bodies.map((body, index) => {
-    const [group, cast] = [new THREE.Group(), new THREE.Group()];
-    for (const made of [group, cast]) {
-      made.matrixAutoUpdate = false;
-      scene.add(made);
-    }
-    return { body, index, group, cast, needs: [...shapes.needs(body.shapes)], built: null };
+  const solids = makeBodies(scene, (shape, geometry, index, k, count) => shapes.objects(shape, geometry).map((object, layer) => {
+    object.userData.body = index;
+    if (layer) object.raycast = () => {};
+    return Object.assign(object, { renderOrder: index + (k + layer / 2) / (count + 1) });
+  }));
+  const casts = drawing.floor ? makeBodies(scene, (shape, geometry) => {
+    const [flat] = shapes.objects(shape, geometry);
+    flat.raycast = () => {};
+    return [Object.assign(flat, { material: shadow, renderOrder: -55 })];
+  }) : null;
+  const ghosts = makeBodies(scene, (shape, geometry, index) => {
+    const [mesh] = shapes.objects(shape, geometry);
+    mesh.material = mesh.material.clone();
+    // In the plane what is drawn first is behind; what is transparent would be drawn last.
+    if (space) Object.assign(mesh.material, { transparent: true, opacity: FAINT, depthWrite: false });
+    else mesh.material.color.lerp(paper, 1 - FAINT);
+    return [Object.assign(mesh, { renderOrder: index / drawing.bodies.length - 9 })];
   });
 
-  function build({ body, index, group, cast }, geometry) {
-    group.clear();
-    cast.clear();
-    body.shapes.forEach((shape, k) => {
-      const objects = shapes.objects(shape, geometry);
-      objects.forEach((object, layer) => {
-        object.renderOrder = index + (k + layer / 2) / (body.shapes.length + 1);
-        object.userData.body = index;
-        if (layer) object.raycast = () => {};
-        group.add(object);
-      });
-      if (space && drawing.floor) {
-        const flat = objects[0].clone();
-        flat.material = shadow;
-        flat.renderOrder = -55;
-        flat.raycast = () => {};
-        cast.add(flat);
-      }
-    });
-  }
-
-  function placeBodies({ poses, geometry, seen }) {
-    for (const entry of bodies) {
-      const state = entry.needs.map((k) => geometry[k]).join();
-      if (entry.built !== state) {
-        build(entry, geometry);
-        entry.built = state;
-      }
-      const { group, cast, index } = entry;
-      shapes.placeAt(group, poses, index);
-      if (space) {
-        const level = world.floorLevel();
-        cast.visible = seen.shadows && view.axes()[2][2] > 0;
-        // Straight down onto the floor.
-        cast.matrix.set(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-6, level, 0, 0, 0, 1).multiply(group.matrix);
-        cast.matrixWorldNeedsUpdate = true;
-      }
-    }
+  function placeBodies(looked, other) {
+    solids.draw(looked);
+    ghosts.draw(other && look(other));
+    const hasShadows = looked.seen.shadows && view.axes()[2][2] > 0;
+    casts?.draw(hasShadows ? looked : null);
+    if (!hasShadows) return;
+    // Straight down onto the floor.
+    const down = new THREE.Matrix4().set(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1e-6, world.floorLevel(), 0, 0, 0, 1);
+    casts?.groups.forEach((group) => group.matrix.premultiply(down));
   }
 
   // ---- The camera ----
@@ -171,8 +152,7 @@ const makeStage = (canvas, mechanism) => {
     if (!renderer) return;
     now.pixel = 1 / view.scale();
     world.draw(view, size, now.poses, now.values, t, theme);
-    placeBodies(now);
-    ghosts.draw(other && look(other));
+    placeBodies(now, other);
     elements.draw(now);
     traces.draw(show, t);
     marks.draw(now, show);
@@ -215,7 +195,7 @@ const makeStage = (canvas, mechanism) => {
     const [right, up] = [(2 * x) / size[0] - 1, 1 - (2 * y) / size[1]];
     camera.updateMatrixWorld();
     caster.setFromCamera(new THREE.Vector2(right, up), camera);
-    const found = caster.intersectObjects(bodies.map(({ group }) => group), true);
+    const found = caster.intersectObjects(solids.groups, true);
     if (!found.length) return null;
     // In the plane all are equally near: the one drawn last is in front.
     return space ? found[0] : found.reduce((a, b) => (b.object.renderOrder > a.object.renderOrder ? b : a));

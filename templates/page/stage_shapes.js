@@ -125,16 +125,5 @@ const shapes = (() => {
     return found;
   }
 
-  // Put what is in a body's axes to its pose.
-  function placeAt(group, poses, index) {
-    if (tools.space) group.matrix.set(...poses.slice(12 * index, 12 * index + 12), 0, 0, 0, 1);
-    else {
-      const [x, y, angle] = poses.slice(3 * index, 3 * index + 3);
-      const [c, s] = [Math.cos(angle), Math.sin(angle)];
-      group.matrix.set(c, -s, 0, x, s, c, 0, y, 0, 0, 1, 0, 0, 0, 0, 1);
-    }
-    group.matrixWorldNeedsUpdate = true;
-  }
-
-  return { objects, needs, turnTo, placeAt };
+  return { objects, needs, turnTo };
 })();

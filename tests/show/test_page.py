@@ -170,6 +170,16 @@ def test_a_page_escapes_whatever_a_scene_says(run: Run) -> None:
             render_page(run.motion, PageCode(f"// {bad}", run.page().table, live=False))
 
 
+def test_sliders_of_joints_end_at_stops() -> None:
+    """At the scene's parameters; a limit may be absent."""
+    stop = (
+        '[[effects]]\ntype = "joint_stop"\nname = "end"\njoint = "pin"\nhigh = "2*l"\nstiffness = 9'
+    )
+    scene = f"{SCENE.format(settings='')}{stop}"
+    run = eomgen.simulate(scene, t_end=0.1, samples=3)
+    assert run.page().table["limits"] == {"a": [None, pytest.approx(1.4)]}
+
+
 def test_a_page_is_small_and_ours(run: Run, tmp_path: Path) -> None:
     save_page(run.motion, run.page(), tmp_path / "a.html")
     save_page(run.motion, run.page(), tmp_path / "a.html")  # ours may be written again
