@@ -37,7 +37,7 @@ def certify(given: Arguments) -> int:
     if given.output is not None:
         found.save(given.output, force=given.force)
         print(f"    wrote {given.output}")
-    return 0 if found.finished else 3
+    return 0 if found.finished else 1
 
 
 def _of_scene(given: Arguments) -> Enclosure:

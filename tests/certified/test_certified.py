@@ -10,13 +10,14 @@ import os
 import random
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from extrapolated import Rate, moved, rate_of
 from mpmath import mp
 from smooth_program import START, STATES, VALUES, everything
 
@@ -27,15 +28,13 @@ from eomgen.certified.balls import SHORT, Ball, ball, column, matrix, precision,
 from eomgen.certified.recursion import Motion
 from eomgen.certified.steps import Pace, Plan, Spread, Step, step_from
 from eomgen.commands.main import main
-from eomgen.program.extended import evaluator
-from eomgen.program.program import Output, Program, finish
+from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape
 from eomgen.store import program_of
 
 flint = pytest.importorskip("flint")
 
 ROOT = Path(__file__).parents[2]
-Rate = Callable[[Any, Sequence[Any]], list[Any]]
 
 
 def exactly(x: Any) -> Ball:
@@ -43,35 +42,6 @@ def exactly(x: Any) -> Ball:
     sign, significand, exponent, _ = mp.mpf(x)._mpf_
     with precision(4096):
         return flint.arb(int(-significand if sign else significand)) * flint.arb(2) ** int(exponent)
-
-
-def rate_of(program: Program, states: Sequence[str], values: dict[str, float]) -> Rate:
-    """Its derivative with 60 digits."""
-    run = evaluator(program, "derivative")
-    return lambda t, y: run({**values, "t": t, **dict(zip(states, y, strict=True))})
-
-
-def moved(rate: Rate, t: Any, y: Sequence[Any], h: Any) -> list[Any]:
-    """The state after a step, with some 40 digits: the modified midpoint rule, extrapolated;
-    Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, II.9.
-    """
-    table: list[list[list[Any]]] = []
-    for k in range(1, 16):
-        n = 2 * k
-        d = h / n
-        old, new = list(y), [a + d * b for a, b in zip(y, rate(t, y), strict=True)]
-        for i in range(1, n):
-            slope = rate(t + i * d, new)
-            old, new = new, [a + 2 * d * b for a, b in zip(old, slope, strict=True)]
-        slope = rate(t + h, new)
-        row = [[(a + b + d * c) / 2 for a, b, c in zip(old, new, slope, strict=True)]]
-        for j in range(1, k):
-            factor = mp.mpf(k * k) / (k - j) ** 2 - 1
-            row.append(
-                [a + (a - b) / factor for a, b in zip(row[-1], table[-1][j - 1], strict=True)]
-            )
-        table.append(row)
-    return table[-1][-1]
 
 
 @pytest.fixture(autouse=True)
