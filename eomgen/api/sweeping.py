@@ -287,18 +287,20 @@ def _run_together(integrator: str, functions: Any) -> bool:
 def _mostly_in_c(integrator: str, functions: Any) -> bool:
     """Whether Python does so little in members that run one by one that threads serve them: if
     compiled code makes almost all steps, and for adaptive methods, whose steps are few, goes
-    through the events of rigid contacts (`run.through_events`). Of adaptive steps Python repeats
-    those that pass over a corner, and begins anew after an event if it keeps constraints.
+    through the events of rigid contacts and over branches of the derivative, see
+    `run.through_events`. Python looks at each of these if constraints are kept, and where branches
+    depend on time alone.
     """
     method = find_integrator(integrator)
     if hasattr(functions, "CONTROLLERS"):
         return False
     if isinstance(method, FixedStep) or not method.compiled:
         return bool(method.compiled)
-    begins_anew = getattr(functions, "CONTACTS", ()) and (
-        integrator not in THROUGH_EVENTS or getattr(functions, "CONSTRAINTS", ())
-    )
-    return not begins_anew and not hasattr(functions, "switching_functions")
+    in_time = hasattr(functions, "_switching_functions_of_time")
+    held = bool(getattr(functions, "CONSTRAINTS", ()))
+    looked = in_time or held or integrator not in THROUGH_EVENTS
+    interrupted = getattr(functions, "CONTACTS", ()) or hasattr(functions, "switching_functions")
+    return not (looked and interrupted)
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:

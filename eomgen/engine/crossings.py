@@ -17,6 +17,7 @@ from eomgen.subset.words import (
     all_within,
     combined,
     copy,
+    inf,
     isfinite,
     larger,
     nan,
@@ -57,8 +58,8 @@ class Watch:
     turning, angles
                   how many states are angles, and which
     earlier, before
-                  the start of the step before, s, and the functions there; not a number if not
-                  known
+                  the start of the step before, s, and the functions there; infinite if not known,
+                  for a comparison with what is not a number would count as unusual
     here, first, last
                   when the step starts, s, and the functions there and at its end
     left          evaluations that are left in the step
@@ -92,7 +93,7 @@ class Watch:
     which: Annotated[Whole, "room"]
     moments: Annotated[Vector, "3"]
     places: Annotated[Matrix, "3", "STATES"]
-    earlier: float = nan
+    earlier: float = inf
     here: float = nan
     left: int = 0
     parts: int = 0
@@ -134,7 +135,7 @@ def begin_at(of: Watch, given: Along, t: float, y: Annotated[Vector, "STATES"]) 
     of.left = MOST_EVALUATIONS + 8 * of.marked
     of.found = 0
     if of.here != t:
-        of.earlier = nan
+        of.earlier = inf
         of.here = t
         evaluate(of, given, t, y, of.first)
 

@@ -38,6 +38,7 @@ from eomgen.run.compiled import (
     Strikes,
     Through,
 )
+from eomgen.run.integrators.strides import OF_STATE
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.run.through_events import THROUGH_EVENTS
@@ -284,6 +285,8 @@ class _Steps:
         self._made: dict[Any, Any] = {}
         self._projects = PROJECTS if problem.projection else ()
         self._contacts = contact_runs.FUNCTIONS if problem.contacts else ()
+        switching = problem.switching
+        self._switching = OF_STATE if switching and switching.of_state else ()
 
     @cached_property
     def series(self) -> taylor.CompiledTaylor | None:
@@ -328,13 +331,14 @@ class _Steps:
 
     def through(self, name: str) -> Through | None:
         """See `Compiled`."""
-        if not self._contacts or name not in THROUGH_EVENTS:
+        if not (self._contacts or self._switching) or name not in THROUGH_EVENTS:
             return None
         if name == "DOP853":
-            needed: tuple[str, ...] = ("derivative", *self._contacts)
+            needed: tuple[str, ...] = ("derivative", *self._switching, *self._contacts)
             return self._once("through", needed, partial(partial, runs.through))
         make = partial(partial, implicit.through, self._problem)
-        return self._once("through", implicit.needed(name, self._problem), make)
+        needed = (*self._switching, *implicit.needed(name, self._problem))
+        return self._once("through", needed, make)
 
     def equal(self, name: str) -> EqualSteps | None:
         """See `Compiled`."""

@@ -12,8 +12,9 @@ from eomgen.run.compiled import Touched
 
 ROOTS: list[tuple[str, Mapping[str, Any]]] = [("taken", {}), ("strike", {})]
 """What is called of the engine."""
-WHOLE_RUNS: list[tuple[str, Mapping[str, Any]]] = [("through_events", {})]
-"""The same for runs from start to end by methods with tolerances."""
+WHOLE_RUNS: list[tuple[str, Mapping[str, Any]]] = [("begins_anew", {}), ("goes_on", {})]
+"""The same for runs from start to end by methods with tolerances, then with events of contacts."""
+THROUGH_EVENTS: list[tuple[str, Mapping[str, Any]]] = [*WHOLE_RUNS, ("through_events", {})]
 FUNCTIONS = ("gaps", "gap_rates", "held", "impact")
 _POINTER, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 

@@ -96,7 +96,8 @@ def sources(library: str, states: int) -> Mapping[str, str]:
         roots += strides.ROOTS
     if of.contacts:
         roots += [*contact_runs.ROOTS, ("differences", {})]
-        roots += [] if name in EQUAL else contact_runs.WHOLE_RUNS
+    if name not in EQUAL:
+        roots += contact_runs.THROUGH_EVENTS if of.contacts else contact_runs.WHOLE_RUNS
     context = {
         **of_mechanism(),
         **contact_runs.values(of.contacts, of.pressed),

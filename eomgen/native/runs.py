@@ -15,6 +15,7 @@ from eomgen.native.mechanism import Mechanism
 from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Stretch, Stride, WholeRun
+from eomgen.run.integrators.strides import OF_STATE
 
 MAIN = "runs.c"
 
@@ -26,12 +27,15 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     from eomgen.subset.languages import C
 
     of_contacts = contact_runs.values(**contact_runs.sizes(interface))
+    switches = any(function.name in OF_STATE for function in interface.functions)
     program, interface = restricted(program, interface, ("derivative",))
     roots = [*equal_steps.roots_of(*equal_steps.METHODS), ("equal_steps", {})]
     roots += [(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")]
     roots += [("within", {}), *strides.ROOTS]
     if of_contacts["contacts"]:
-        roots += [*contact_runs.ROOTS, *contact_runs.WHOLE_RUNS]
+        roots += [*contact_runs.ROOTS, *contact_runs.THROUGH_EVENTS]
+    elif switches:
+        roots += contact_runs.WHOLE_RUNS
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
@@ -39,6 +43,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "last": DOP853.last,
         "equal": True,
         "adaptive": True,
+        "whole_runs": switches or of_contacts["contacts"],
         "engine": C.prelude + c_source(roots),
         **of_contacts,
         **of_mechanism(),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eomgen.engine.adaptive import EVENT, UNUSUAL, Bounds, Progress
 from eomgen.engine.adaptive_steps import Records, Start
 from eomgen.engine.branches import Switches
-from eomgen.engine.crossings import Watch
+from eomgen.engine.crossings import MOST_PARTS, Watch
 from eomgen.engine.methods import Root
 from eomgen.engine.structures import address, filled, take, with_room
 from eomgen.native import contact_runs
@@ -59,7 +59,7 @@ class _Checks(ctypes.Structure):
 
     _fields_ = (
         *((name, _POINTER) for name in ("system", "run", "watch", "found")),
-        *(("clear", _REAL), ("only_whole", _WHOLE)),
+        *(("clear", _REAL), ("only_whole", _WHOLE), ("cuts", _WHOLE)),
         *((name, _POINTER) for name in ("margins", "switched", "values", "switches")),
         ("switching_calls", _WHOLE),
         *((name, _POINTER) for name in ("by", "at", "y", "raw")),
@@ -105,7 +105,8 @@ def _given(method: Method, of: Mechanism, stretch: Stretch) -> _Given:
     at = filled(Progress(solver.t, length=0.0 if method.follows else float(solver.h_abs)))
     checks = _Checks(
         *map(ctypes.addressof, (system, run, *seen[2:])),
-        *(watched.clear if watched else math.inf, stretch.only_whole),
+        watched.clear if watched else math.inf,
+        *(stretch.only_whole, watched is not None and watched.unseen > 0.0),
         *map(address, (margins[1:], switched, values, switches)),
     )
     slope = getattr(solver, "f", solver.y)
@@ -196,7 +197,8 @@ class _Checked(NamedTuple):
     def of(watched: Watched | None, states: int) -> "_Checked":
         """The room, with what is known of the functions."""
         watch = _watch(watched, states) if watched and watched.ends else branches.watch(0, states)
-        found = branches.switches(states, last=watched.switched if watched else -math.inf)
+        last, unseen = (watched.switched, watched.unseen) if watched else (-math.inf, 0.0)
+        found = branches.switches(states, watch.room, last=last, unseen=unseen)
         return _Checked(watch, found, filled(watch), filled(found))
 
 
@@ -209,7 +211,8 @@ def _unchecked(states: int) -> _Checked:
 def _watch(watched: Watched, states: int) -> Watch:
     """Room for the switching functions along steps, and what is known of them."""
     (earlier, before), (here, first) = watched.ends
-    made = branches.watch(len(first), states, watched.angles, watched.timed)
+    room = MOST_PARTS * len(first) if watched.unseen else branches.MOST_BRACKETS
+    made = branches.watch(len(first), states, watched.angles, watched.timed, room=room)
     made.earlier, made.before[:], made.here, made.first[:] = earlier, before, here, first
     return made
 

@@ -98,6 +98,8 @@ class Watched:
     clear     the time, s, up to which no switching function of time alone changes its sign
     timed     whether those of the state depend on time, too
     angles    indices of the states that are angles
+    unseen    the longest step, s, if the functions cannot be followed along it, for steps that are
+              made again where they pass over a branch; 0 for such that are not made
     """
 
     ends: Sequence[tuple[float, Array]]
@@ -105,6 +107,7 @@ class Watched:
     clear: float
     timed: bool
     angles: tuple[int, ...]
+    unseen: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +154,10 @@ Series = Callable[[float, Array, int], Array]
 
 @dataclass(frozen=True, eq=False)
 class WholeRun:
-    """A run through all events of rigid contacts of which only rows are wanted.
+    """A run of which only rows are wanted, through all events of rigid contacts and over all
+    branches of the derivative.
 
-    stretch  its steps, of which the first row's time is that of the start; `touched` is given
+    stretch  its steps, of which the first row's time is that of the start
     near     a row at most so much before a strike, s, is the state after it
     most     greatest number of steps from one event to the next
     """
@@ -244,7 +248,7 @@ class Compiled:
                 may begin to compile when the run is a long one
     equal       the same for methods with equal steps, without further functions
     strikes     lets rigid contacts strike; None as for steps
-    through     the runs of a method through all events of rigid contacts; None as for steps
+    through     the runs of a method through all events and branches; None as for steps
     """
 
     derivative: Callable[[float, Array], Array]

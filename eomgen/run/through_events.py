@@ -1,11 +1,13 @@
-"""Runs with rigid contacts of which only rows are wanted: compiled code goes through all events."""
+"""Runs of which only rows are wanted: compiled code goes through the events of rigid contacts, and
+over branches of the derivative.
+"""
 
 from types import SimpleNamespace
 
 import numpy as np
 
 from eomgen.base.options import taking
-from eomgen.run.compiled import Stretch, WholeRun
+from eomgen.run.compiled import Stretch, Touched, Watched, WholeRun
 from eomgen.run.contacts import in_sizes
 from eomgen.run.events import at_start
 from eomgen.run.failure import StepFailure
@@ -24,11 +26,14 @@ NEAR = 1e-9
 
 
 def goes_through(problem: Problem) -> bool:
-    """Whether compiled code can go through all events of a problem: its derivative is smooth
-    between those of rigid contacts, and nothing else is checked of steps.
+    """Whether compiled code can go through all that interrupts the motion: the events of rigid
+    contacts, and branches of the derivative that depend on the state; nothing else is checked.
     """
     checked = problem.projection or problem.solved_loops or problem.scrutiny or problem.sampling
-    return bool(problem.contacts) and not (checked or problem.corners or problem.switching)
+    switching = problem.switching
+    if checked or (switching and switching.of_time) or (problem.corners and not switching):
+        return False
+    return bool(problem.contacts or switching)
 
 
 @taking(Wanted)
@@ -44,15 +49,12 @@ def rows_through_events(wanted: Wanted) -> FloatArray | None:
     through = compiled.through(method.compiled)
     if through is None:
         return None
-    contacts = problem.contacts
-    assert contacts is not None
-    problem = problem.having(contacts=in_sizes(contacts))
+    bounds, y = tolerances_of(asked, problem), problem.initial
     try:
         with np.errstate(all="ignore"):
-            touched = at_start(problem, (asked.t_start, asked.t_end), asked.rest_speed)
+            touched, watched = _touched(asked, problem), _watched(asked, problem, bounds.unseen)
     except (ArithmeticError, ValueError, StepFailure):
         return None
-    bounds, y = tolerances_of(asked, problem), problem.initial
     stretch = Stretch(
         solver=SimpleNamespace(t=asked.t_start, y=y.copy(), f=y * 0.0, lost=y * 0.0, h_abs=0.0),
         until=asked.t_end,
@@ -64,9 +66,28 @@ def rows_through_events(wanted: Wanted) -> FloatArray | None:
         dense=False,
         counts_terms=False,
         times=times_of(asked),
-        watched=None,
-        touched=touched.copy(asked.t_start, y, TOGETHER),
+        watched=watched,
+        touched=touched,
         only_whole=False,
         constrained=None,
     )
     return through(WholeRun(stretch, NEAR * asked.span, CHECK_STIFFNESS))
+
+
+def _touched(asked: Asked, problem: Problem) -> Touched | None:
+    """What steps are given of rigid contacts."""
+    if problem.contacts is None:
+        return None
+    problem = problem.having(contacts=in_sizes(problem.contacts))
+    touched = at_start(problem, (asked.t_start, asked.t_end), asked.rest_speed)
+    return touched.copy(asked.t_start, problem.initial, TOGETHER)
+
+
+def _watched(asked: Asked, problem: Problem, unseen: float) -> Watched | None:
+    """What steps are checked for branches with; nothing is known of the functions there."""
+    switching = problem.switching
+    if not switching or not switching.of_state:
+        return None
+    unknown = np.nan, np.nan * switching.of_state(asked.t_start, problem.initial)
+    how = switching.timed, switching.angles, unseen
+    return Watched((unknown, unknown), -np.inf, np.inf, *how)

@@ -69,9 +69,12 @@ class Text:
         }
 
     def given(self, protocol: str) -> Mapping[str, Kind]:
-        """The kinds of what the functions of a protocol return."""
+        """The kinds of what the functions of a protocol, and of those that it extends, return."""
+        extended = self.classes[protocol].bases if protocol in self.classes else []
+        found = [self.given(base.id) for base in extended if isinstance(base, ast.Name)]
         functions = (d for d in self._body(protocol) if isinstance(d, ast.FunctionDef))
-        return {d.name: kind_of(d.returns) for d in functions}
+        found.append({d.name: kind_of(d.returns) for d in functions})
+        return {name: kind for each in found for name, kind in each.items()}
 
     def _body(self, name: str) -> list[ast.stmt]:
         return self.classes[name].body if name in self.classes else []

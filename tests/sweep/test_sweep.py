@@ -92,6 +92,23 @@ def test_nothing_depends_on_who_runs_it(tmp_path: Path) -> None:
 
 
 TOGETHER: dict[str, Any] = {"integrator": "rk4", "dt": 0.01, "t_end": 0.5, "backend": "c"}
+STOPS = """
+name = "wheel"
+parameters = { w = 0.01, k = 400.0 }
+bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
+initial = { q = [0.0], v = [3.0] }
+effects = [{ type = "motor", name = "stops", joint = "axle", torque = "push" }]
+[[joints]]
+name = "axle"
+type = "revolute"
+parent = "world"
+child = "disc"
+coordinate = "q"
+"""
+STOPS = STOPS.replace(
+    "push", "-k*max(0, q - 1) + k*max(0, -1 - q) + (300.0 if abs(q - 0.3) < w else 0)"
+)
+"""Two stops, and a push in a place that long steps pass over."""
 COMPILED = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 
 
@@ -140,16 +157,26 @@ def test_compiled_members_run_in_threads(
 @pytest.mark.every(2)
 @COMPILED
 @pytest.mark.parametrize("method", THROUGH_EVENTS)
-def test_compiled_members_go_through_contacts(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By adaptive methods, in threads: strikes, contacts that are held, in C alone, with the bits
-    of single runs. One begins with a strike, at the time of a row.
+@pytest.mark.parametrize(
+    ("scene", "vary"),
+    [
+        (BLOCK, {"block_y": [0.1, 0.3 * np.sin(0.2)], "lift": [0.0, 8.5]}),
+        (STOPS, {"w": [0.002, 0.02], "q": [0.0, -0.5]}),
+    ],
+    ids=["contacts", "branches"],
+)
+def test_compiled_members_go_through_events(
+    method: str, scene: str, vary: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By adaptive methods, in threads: strikes, contacts that are held, steps that pass over a
+    branch and are made again; in C alone, with the bits of single runs. One begins with a strike,
+    at the time of a row.
     """
     asked = {"t_end": 1.0, "samples": 9, "integrator": method, "rtol": 1e-6}
-    vary = {"block_y": [0.1, 0.3 * np.sin(0.2)], "lift": [0.0, 8.5]}
-    python = eomgen.ensemble(BLOCK, vary, backend="numpy", **asked)
+    python = eomgen.ensemble(scene, vary, backend="numpy", **asked)
     monkeypatch.setattr(members, "integrate", pytest.fail)
     monkeypatch.setattr(execute, "by_processes", pytest.fail)
-    assert same(python, eomgen.ensemble(BLOCK, vary, workers=2, backend="c", **asked))
+    assert same(python, eomgen.ensemble(scene, vary, workers=2, backend="c", **asked))
 
 
 @pytest.mark.parametrize("asked", [QUICK, pytest.param(TOGETHER, marks=COMPILED)])
