@@ -78,14 +78,14 @@ pytestmark = compiler
 def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The numbers of steps that were made in C at once."""
     numbers: list[int] = []
-    original = strides.Strides.made
+    original = strides.Strides._compiled
 
     def noted(self: strides.Strides, *given: Any) -> Any:
         stride = original(self, *given)
         numbers.append(len(stride.ends) if stride else 0)
         return stride
 
-    monkeypatch.setattr(strides.Strides, "made", noted)
+    monkeypatch.setattr(strides.Strides, "_compiled", noted)
     return numbers
 
 
@@ -150,13 +150,13 @@ def test_stops_and_pulses_are_seen(scene: str, share: float, made: list[int]) ->
 
 def test_python_makes_only_what_was_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """A step that passed over a pulse is repeated in C, shorter."""
-    made, step = list[float](), DormandPrince8.step
+    made, make = list[float](), DormandPrince8.make
 
-    def noted(self: DormandPrince8) -> str | None:
+    def noted(self: DormandPrince8, *given: Any) -> bool:
         made.append(self.t)
-        return step(self)
+        return make(self, *given)
 
-    monkeypatch.setattr(DormandPrince8, "step", noted)
+    monkeypatch.setattr(DormandPrince8, "make", noted)
     random, cut = np.random.default_rng(3), 0
     for _ in range(5):
         exponents = {"w": random.uniform(-5, -1), "k": random.uniform(0, 5)}

@@ -62,7 +62,7 @@ RK4, _, DOP853, _, RODAS, GAUSS, *_ = METHODS
 def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """The numbers of steps that C has made at once."""
     made: list[int] = []
-    adaptive, equal = Strides.made, equal_steps.Call.made
+    adaptive, equal = Strides._compiled, equal_steps.Call.made
 
     def adaptive_noted(*given: Any) -> Any:
         stride = adaptive(*given)
@@ -74,7 +74,7 @@ def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
         made.append(given[4].made)
         return why
 
-    monkeypatch.setattr(Strides, "made", adaptive_noted)
+    monkeypatch.setattr(Strides, "_compiled", adaptive_noted)
     monkeypatch.setattr(equal_steps.Call, "made", equal_noted)
     yield made
 
