@@ -1,7 +1,7 @@
 """Steps of an adaptive method, many at once, in compiled code or in Python."""
 
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -39,9 +39,14 @@ class Strides:
             *(PROJECTS if problem.projection else ()),
         )
         self._usual, self._size = True, Size()
-        self._own, looks = InPython(stepper), (contacts, problem.projection, self._looked)
-        self._alone = settings.alone or any(map(bool, (*looks, stepper.branches)))
+        looks = contacts, problem.projection, self._looked, stepper.branches
+        self._alone = settings.alone or any(map(bool, looks))
         self._ahead = 1
+
+    @cached_property
+    def _own(self) -> InPython:
+        """Makes steps in Python."""
+        return InPython(self._stepper)
 
     def made(self, most: int) -> Portion | None:
         """Make at most `most` steps and put the solver at their end; None if the next one must be
