@@ -5,6 +5,7 @@
 const makePointer = (canvas, stage, { canPull, pull, release, light, redraw }) => {
   const { space } = tools;
   const CLICK = 4; // pixels that a click may move
+  const [FINE, COARSE] = [7, 18]; // pixels from an arrow within which a mouse or pen means it, and a finger
   const touches = new Map(); // where each finger is
   let grip = null; // {body, at, world} of the pulled body
   let spread = 0; // distance of two fingers
@@ -27,7 +28,7 @@ const makePointer = (canvas, stage, { canPull, pull, release, light, redraw }) =
     }
     if (event.button !== 0 || event.shiftKey) return;
     const spot = spotOf(event);
-    const effect = stage.effectAt(...spot);
+    const effect = stage.effectAt(...spot, event.pointerType === "touch" ? COARSE : FINE);
     if (effect) arrow = { effect, spot };
     else takeAt(spot);
   });
@@ -48,7 +49,7 @@ const makePointer = (canvas, stage, { canPull, pull, release, light, redraw }) =
     const before = touches.get(event.pointerId);
     const here = spotOf(event);
     if (!before) {
-      if (event.pointerType === "mouse") canvas.classList.toggle("over", Boolean(stage.effectAt(...here) || (canPull() && stage.pick(...here))));
+      if (event.pointerType === "mouse") canvas.classList.toggle("over", Boolean(stage.effectAt(...here, FINE) || (canPull() && stage.pick(...here))));
       return;
     }
     if (arrow) {

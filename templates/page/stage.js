@@ -201,8 +201,8 @@ const makeStage = (canvas, mechanism) => {
     return space ? found[0] : found.reduce((a, b) => (b.object.renderOrder > a.object.renderOrder ? b : a));
   }
 
-  // The effect whose arrow is at a place of the picture, or null.
-  stage.effectAt = (x, y) => arrows.effectAt([x, y], view.toScreen);
+  // The effect whose arrow is within so many pixels of a place of the picture, or null.
+  stage.effectAt = (x, y, near) => arrows.effectAt([x, y], near, view.toScreen);
 
   // The body at a place of the picture: {body, at: the point in its axes, world}, or null.
   stage.pick = (x, y) => {

@@ -12,7 +12,6 @@ const makeArrows = (scene, mechanism) => {
   };
   const BY_EFFECTS = new Set(["forces", "torques"]);
   const LIT = "#1f7ae0";
-  const NEAR = 7; // pixels from an arrow within which a pointer means it
   const [BAR, USUAL, LONGEST] = [60, 100, 500]; // pixels: of the legend, of a large value, at most
   const [HEAD, NECK] = [11, 4.5]; // length and radius of an arrowhead, pixels
   const SMALLEST = 3; // shorter arrows are not drawn, pixels
@@ -143,9 +142,9 @@ const makeArrows = (scene, mechanism) => {
     return Math.hypot(to[0] - part * along[0], to[1] - part * along[1]);
   }
 
-  // The effect of the arrow at a spot of the picture; null if there is none within NEAR pixels.
-  function effectAt(spot, toScreen) {
-    let [least, found] = [NEAR, null];
+  // The effect of the arrow at a spot of the picture; null if there is none within so many pixels.
+  function effectAt(spot, near, toScreen) {
+    let [least, found] = [near, null];
     for (const { effect, points } of reach) {
       for (let i = 0; i < points.length; i += 6) {
         const far = distance(spot, toScreen(points.slice(i, i + 3)), toScreen(points.slice(i + 3, i + 6)));
