@@ -104,6 +104,10 @@ def effect(base: str, kind: str, keys: str) -> str:
     return f'{body}[[effects]]\ntype = "{kind}"\nname = "e"\n{keys}\n{start}{rest}'
 
 
+PARTNER = (
+    '[[bodies]]\nname = "moon"\nmass = 0.2\n[[joints]]\nname = "orbit"\ntype = "particle"\n'
+    'parent = "world"\nchild = "moon"\n'
+)
 SPRING = 'body_1 = "world"\nbody_2 = "block"\nrest_length = 0.8\n'
 CONTACT = 'body = "ball"\nlaw = "hunt_crossley"\nradius = 0.2\nstiffness = 1e4\n'
 SCENES: Mapping[str, str] = {
@@ -144,6 +148,8 @@ SCENES: Mapping[str, str] = {
         BALL, "contact", 'law = "spring_damper"\nstiffness = 1e3\nagainst = "heights"\n'
         'height = "0.1*sin(5*x)"\nbody = "ball"\nradius = 0.1'),
     "wind": effect(BALL, "drag", 'body = "ball"\nlinear = 0.1\nwind = [3.0, 0.5]'),
+    "pull": effect(BALL.replace("[initial]", PARTNER + "[initial]"), "pairwise",
+                   'bodies = ["ball", "moon"]\ngravitation = 1.0'),
     **{name: (ENTRIES / f"{entry}.toml").read_text("utf-8")
        for name, entry in (("cord", "rope"), ("belt", "belt"), ("gear", "gear"))},
     "force": effect(ARM, "external_force", 'body = "arm"\nat = [0.3, 0]\nforce = [0, 1.0]'),

@@ -130,7 +130,7 @@ def _marks(picture: Picture, element: Element) -> Iterator[Mark]:
             rest = element.rest if element.kind == "rope" else None
             between = Between(element.start, element.end, element.radius, rest)
             yield Mark(between, symbols.link(element.kind, _dimensions(picture)))
-            for end in (element.start, element.end):
+            for end in (element.start, element.end) if element.kind != "pull" else ():
                 yield Mark(Facing(end, element.radius), symbols.END)
         case Cord():
             yield Mark(Over(element.stops, element.radii, element.closed), symbols.CORD)
@@ -192,6 +192,8 @@ def _at_joint(picture: Picture, element: AtJoint, joint: DrawnJoint) -> Iterator
     carriage, axis = Attachment(joint.child, joint.at_child), None
     if joint.axis is not None and _slides(element, joint):
         axis = joint.axis[: _dimensions(picture)]
+    elif element.kind != "stop":
+        axis = _straight(element, joint, _dimensions(picture))
     limits = tuple(limit for limit in (element.low, element.high) if limit is not None)
     if element.kind == "stop":
         if axis is not None:
@@ -214,6 +216,16 @@ def _at_joint(picture: Picture, element: AtJoint, joint: DrawnJoint) -> Iterator
 def _slides(element: AtJoint, joint: DrawnJoint) -> bool:
     """Whether the coordinate of an element is a displacement along the joint's axis."""
     return joint.type == "prismatic" or (joint.type == "cylindrical" and not element.coordinate)
+
+
+def _straight(element: AtJoint, joint: DrawnJoint, dimensions: int) -> Vector | None:
+    """The axis of the parent along which a coordinate of a particle, or of a planar joint in the
+    plane, is a displacement; None if it is none.
+    """
+    planar = joint.type == "planar" and dimensions == 2
+    count = dimensions if joint.type == "particle" else 2 if planar else 0
+    k = element.coordinate
+    return constant(*np.eye(dimensions)[k]) if k < count else None
 
 
 def _round(ball: Round, size: float) -> Iterator[Mark]:

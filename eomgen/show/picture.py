@@ -117,14 +117,14 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
     colours = body_colours(model)
     bodies = []
     for body, own, colour in zip(model.bodies, points, colours, strict=True):
-        given = appearance.shapes.get(body.name)
+        own_colour, given = colour, appearance.shapes.get(body.name)
         if given:
             shapes = tuple(shape_from_centre(shape, body.com) for shape in given)
             colour = shapes[0].color or colour
             shapes = (*hidden_rods(model, shapes, own.joints, size, colour), *shapes)
         else:
             shapes = invented_shapes(inventor, body, own, colour)
-        painted = tuple(s if s.color else s.replaced(color=colour) for s in shapes)
+        painted = tuple(s if s.color else s.replaced(color=own_colour) for s in shapes)
         bodies.append(DrawnBody(body.name, colour, painted))
     joints = tuple(_joint(model, k, body) for k, body in _holders(model))
     elements = (*_supports(model, size), *elements_of_constraints(model, size), *elements)

@@ -103,9 +103,10 @@ def _damper(side: float = 0.0, wide: float = 0.8) -> Symbol:
 
 @cache
 def link(kind: str, dimensions: int) -> Symbol:
-    """A spring, a damper, both side by side, or a rope."""
-    if kind == "rope":
-        return (Line(tuple((i / 24, 0.0) for i in range(25)), 1.1),)
+    """A spring, a damper, both side by side, a rope, or a pull."""
+    if kind in ("rope", "pull"):
+        along = tuple((i / 24, 0.0) for i in range(25))
+        return (Line(along, 1.1) if kind == "rope" else Line(along, 0.6, 0.35, dashed=True),)
     if kind == "spring_damper":
         return (Line(_coil(dimensions, 0.9, 0.6), 1.1), *_damper(-0.9, 0.55))
     return _damper() if kind == "damper" else (Line(_coil(dimensions), 1.1),)

@@ -1,4 +1,4 @@
-"""Ropes, belts and gears in pictures: along tangents, around discs, and tooth in gap."""
+"""Ropes, belts, gears and arrows in pictures: along tangents, around discs, tooth in gap."""
 
 from typing import Any
 
@@ -10,6 +10,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.look import Polygon, numbers
 from eomgen.scene.reader import parse_scene
+from eomgen.show.marks import Along, Between, Facing, marks_of
 from eomgen.show.picture import picture_of
 from eomgen.show.strokes import Sight, strokes
 from eomgen.show.symbols import CORD
@@ -78,3 +79,41 @@ def test_gears_mesh() -> None:
         assert sum(reach) > np.hypot(0.5, 0.2) * 1.02
         assert not Outline(one).contains_points(other).any()
         assert not Outline(other).contains_points(one).any()
+
+
+PUCKS = """
+name = "pucks"
+bodies = [
+    { name = "a", mass = 1.0, inertia_com = 0.1, shapes = [
+        { type = "disc", radius = 0.1, color = "#ff0000" },
+        { type = "disc", radius = 0.05, center = [0.2, 0.0] },
+    ] },
+    { name = "b", mass = 1.0 },
+]
+joints = [
+    { name = "air", type = "planar", parent = "world", child = "a" },
+    { name = "path", type = "particle", parent = "world", child = "b" },
+]
+effects = [
+    { type = "pd", name = "along", joint = "air", coordinate = "air_x", stiffness = 3, target = 1 },
+    { type = "motor", name = "about", joint = "air", coordinate = "air_angle", torque = 1.0 },
+    { type = "joint_friction", name = "up", joint = "path", coordinate = "b_y", viscous = 1 },
+    { type = "pairwise", name = "pull", bodies = "all", gravitation = 1.0 },
+]
+"""
+
+
+def test_what_acts_along_a_line_has_a_straight_arrow() -> None:
+    """Also at a particle and a planar joint; gravitation is a dashed line; and the colour of one
+    shape is that of no other.
+    """
+    scene = parse_scene(PUCKS)
+    picture = picture_of(elaborate(scene), appearance_of(scene))
+    marks = list(marks_of(picture))
+    axes = [tuple(map(float, numbers(m.frame.axis))) for m in marks if isinstance(m.frame, Along)]
+    assert axes == [(1.0, 0.0), (0.0, 1.0)]
+    assert sum(isinstance(mark.frame, Facing) for mark in marks) == 1
+    (pull,) = (mark for mark in marks if isinstance(mark.frame, Between))
+    assert all(line.dashed for line in pull.symbol)
+    first, second = (shape.color for shape in picture.bodies[0].shapes)
+    assert (first, second != first) == ("#ff0000", True)

@@ -72,9 +72,11 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Link:
-    """A spring, a damper or both between two points, or a rope, which is slack below `rest`, m."""
+    """A spring, a damper or both between two points, a rope, which is slack below `rest`, m, or a
+    pull, which no thing transmits.
+    """
 
-    kind: Literal["coil", "damper", "spring_damper", "rope"]
+    kind: Literal["coil", "damper", "spring_damper", "rope", "pull"]
     effect: str
     start: Attachment
     end: Attachment

@@ -110,11 +110,11 @@ gravitation = 6.7e-11
         return total
 
     def elements(self, layout: Layout) -> Iterator[Link]:
-        """A spring between every two bodies; a line, as a rope, for other attractions."""
+        """A spring between every two bodies; a dashed line for other attractions."""
         for one, two in self.pairs(tuple(layout.bodies)[1:]):
             for link in self.spring(layout.dimensions, one, two).elements(layout):
                 plain = self.stiffness is None
-                yield replace(link, kind="rope", rest=ZERO) if plain else link
+                yield replace(link, kind="pull", rest=None) if plain else link
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
