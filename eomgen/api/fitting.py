@@ -20,6 +20,7 @@ from eomgen.fitting.estimate import Estimate, Residuals, Sought, Weighed, estima
 from eomgen.fitting.inertias import chart
 from eomgen.fitting.logs import Data, Log, read_log
 from eomgen.fitting.motion import Motion, Samples
+from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.results.fitted import Fit
 from eomgen.run.module import GeneratedModule
@@ -70,6 +71,7 @@ class _Task:
         """The task, with all arguments checked. Raises `RunError`."""
         if model.constraints:
             raise RunError("fit: takes trees of bodies, and this scene has loops or constraints")
+        check_no_samples(model, "fits")
         model = replace(model, form="velocity", outputs=())
         argument = reporter.argument
         logs = _logs(options.data)

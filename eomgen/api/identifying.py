@@ -12,6 +12,7 @@ from eomgen.fitting.columns import sorted_columns
 from eomgen.fitting.estimate import determined, told
 from eomgen.fitting.logs import Log
 from eomgen.fitting.motion import Motion, Samples
+from eomgen.model.clocks import check_no_samples
 from eomgen.model.model import Model
 from eomgen.study.diagnosis import problem_of
 
@@ -47,6 +48,7 @@ def told_by(
     argument = reporter.argument("identifiable")
     if model.constraints:
         raise RunError(f"{argument}: takes trees of bodies; this scene has loops or constraints")
+    check_no_samples(model, "sensitivities")
     model = replace(model, form="velocity", outputs=())
     times = np.linspace(0.0, min(t_end, LONGEST), SAMPLES)
     states = (c.name for c in (*model.coordinates, *model.velocities))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Values, check, values_of
+from eomgen.api.given import Source, Values, check, read, values_of
 from eomgen.api.inputs import constant_inputs
 from eomgen.api.options import PointOptions
 from eomgen.api.public import public
@@ -44,9 +44,21 @@ class Linearised:
 def linearise(options: PointOptions) -> "Linearisation":
     """Linearise a scene: A and B of δẏ = A δy + B δu about an equilibrium or a state.
 
-    Raises `SceneError`, or `RunError` for an invalid argument or if there is no equilibrium.
+    Controllers that sample are left out, and the inputs that they drive are inputs; `discrete` of
+    the result gives the system from one sample to the next. Raises `SceneError`, or `RunError` for
+    an invalid argument or if there is no equilibrium.
     """
-    return linearised_at(linearisable(check(options.source)), options).linearisation
+    return linearised_at(linearisable(plant_of(options.source)), options).linearisation
+
+
+def plant_of(source: Source) -> Model:
+    """The model of a scene without what samples: of its controllers the inputs are left."""
+    model = check(source)
+    if not model.sampled:
+        return model
+    scene = read(source)
+    effects = tuple(effect for effect in scene.effects if effect.sampling() is None)
+    return check(scene.replaced(effects=effects))
 
 
 def linearisable(model: Model) -> Model:

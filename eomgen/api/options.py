@@ -555,6 +555,13 @@ class SpaceOptions(PointOptions):
         'states, outputs of the module or their components, by name, for example "theta", '
         '"point_positions.tip.x" or "kinetic_energy"; (): all states',
     )
+    period: float | None = option(
+        None,
+        "time between samples, with inputs held: the system is x⁺ = A x + B u then",
+        unit="s",
+        none="continuous time",
+        check=check_time,
+    )
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, values_of
+from eomgen.api.given import Source, Values, values_of
 from eomgen.api.inputs import constant_inputs
-from eomgen.api.linearising import Linearised, linearisable, linearised_at
+from eomgen.api.linearising import Linearised, linearisable, linearised_at, plant_of
 from eomgen.api.options import SpaceOptions
 from eomgen.api.public import public
 from eomgen.api.states import state_names
@@ -40,7 +40,7 @@ def state_space(options: SpaceOptions) -> Any:
     an unknown output, or if python-control is not installed.
     """
     control = library()
-    model, outputs = linearisable(check(options.source)), options.outputs
+    model, outputs = linearisable(plant_of(options.source)), options.outputs
     wanted = _outputs_of(outputs, _states(model))
     model = replace(model, outputs=(*model.outputs, *wanted))
     found = linearised_at(model, options)
@@ -52,11 +52,10 @@ def state_space(options: SpaceOptions) -> Any:
     else:
         names = list(least.state_names)
         C, D = np.eye(len(names)), np.zeros((len(names), len(least.input_names)))
+    sampled = None if options.period is None else least.discrete(options.period)
     return control.ss(
-        least.A,
-        least.B,
-        C,
-        D,
+        *((sampled or least).A, (sampled or least).B, C, D),
+        *([sampled.period] if sampled else []),
         states=list(least.state_names),
         inputs=list(least.input_names),
         outputs=names,
@@ -75,7 +74,7 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
     Raises `SceneError`, or `RunError` for an unknown output or if python-control is not installed.
     """
     control = library()
-    model = check(source)
+    model = plant_of(source)
     wanted = _outputs_of(outputs, _states(model))
     _, module = compiled(replace(model, form="velocity", outputs=wanted))
     states = list(module.STATES)

@@ -162,6 +162,9 @@ def test_runs_and_sweeps_by_other_steps_have_them(run: eomgen.Run) -> None:
 def test_what_does_not_sample_says_so(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="'hold' samples, which steps of a stepper do not"):
         eomgen.stepper(SPRUNG, dt=1e-3)
+    log = {"t": np.linspace(0, 1, 5), X: np.zeros(5)}
+    with pytest.raises(RunError, match="'hold' samples, which fits do not; leave it out"):
+        eomgen.fit(SPRUNG, log, ["spring_stiffness"])
     with pytest.warns(UserWarning, match="no exact times of samples: these are left to you"):
         paths = eomgen.export(SPRUNG, "firmware", tmp_path, number="float")
     assert "sprung_sample(" not in paths[0].read_text("utf-8")

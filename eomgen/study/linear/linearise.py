@@ -15,6 +15,7 @@ from eomgen.base.frozen import Frozen
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.tangents import tangents
+from eomgen.study.linear.discrete import Discrete, discrete_of
 from eomgen.study.linear.manifold import Manifold, is_constrained, manifold
 from eomgen.study.linear.modes import Mode, controllable_rank, modes, stability
 
@@ -88,6 +89,16 @@ class Linearisation(Frozen, Displayed):
             rates=self.rates,
             quaternions=(),
         )
+
+    def discrete(self, period: float, noise: FloatArray | None = None) -> Discrete:
+        """The `reduced` system from one sample to the next, with inputs held for `period` s.
+
+        `noise` (n, n) is the spectral density of white noise in the rates, of which `Q` is what it
+        adds to the covariance. Raises `RunError` for a period that is not positive.
+        """
+        least = self.reduced()
+        names = least.state_names, least.input_names
+        return discrete_of(least.A, least.B, names, period, noise)
 
     @property
     def basis(self) -> FloatArray:
