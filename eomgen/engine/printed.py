@@ -30,7 +30,6 @@ from eomgen.engine import (
     rattle,
     roots,
     rosenbrock,
-    sampled,
     sampling,
     separable,
     sums,
@@ -96,7 +95,7 @@ CODES = {
 def text() -> Text:
     """The text of the whole engine."""
     adapted = (adaptive, adaptive_runs, adaptive_steps)
-    own = (linearly_implicit, sampled, sampling)
+    own = (linearly_implicit, sampling)
     steps = (equal_steps, explicit, implicit, rosenbrock, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)

@@ -5,29 +5,34 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from eomgen.base.errors import RunError
-from eomgen.base.templating import render
-from eomgen.codegen.backends import c, python
+from eomgen.codegen.backends import python
 from eomgen.codegen.interface import Interface
-from eomgen.engine.adaptive import Bounds, Progress
-from eomgen.engine.embedded import DOP853
-from eomgen.engine.sampled import sampled
-from eomgen.engine.structures import filled
+from eomgen.engine.adaptive import MADE, UNUSUAL, Bounds, Progress
+from eomgen.engine.adaptive_steps import Records, Start, adaptive_steps
+from eomgen.engine.quaternions import normalised
+from eomgen.engine.structures import with_room
 from eomgen.fitting.sensitive import MEASURED, Entries, sensitive
 from eomgen.model.model import Model
+from eomgen.native import runs, strides
 from eomgen.native.accelerator import AN_OPERATION, STARTING, pays
 from eomgen.native.library import compiled_library, kept_library
+from eomgen.native.mechanism import Mechanism
 from eomgen.native.module import Kernels
+from eomgen.run.compiled import Stretch
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.module import load_module
 from eomgen.run.problem import FloatArray
 from eomgen.store import bytecode_of, interfaced_program_of, kept_text, key_of, package_digest
 
-MAIN = "sampled.c"
+TOGETHER = 64
+"""So many steps are recorded before their records are used again."""
 MOST, MORE = 100_000, 300
 """The most derivatives of a run, and how many more for each row: a run at values far from those
 sought may take endless steps."""
@@ -62,12 +67,6 @@ class Rows:
     measured_slopes: FloatArray
 
 
-class _System(ctypes.Structure):
-    """`System` of `templates/c/sampled.c.jinja`."""
-
-    _fields_ = (("k", _POINTER), ("inputs", _POINTER))
-
-
 class Motion:
     """The motions of a model with their sensitivities to what `names` are; see `sensitive`.
 
@@ -96,12 +95,14 @@ class Motion:
         self._ny = len(self._module.STATES) // (1 + len(names))
         self._varies = bool(varying)
         self._places = np.array(sum(self._module.QUATERNIONS, ()), np.int64)
-        self._about, self._sources = f"{about} {package_digest()}", lambda: _sources(*made())
+        beside = (MEASURED,) if self._of else ()
+        self._about = f"{about} {package_digest()}"
+        self._sources = lambda: runs.sources(*made(), beside, equal=False)
         self._kernels: Kernels | None = None
         operations = sum(kinds["total"] for kinds in self._module.COST.values())
         self._price, self._spent = STARTING + AN_OPERATION * operations, 0.0
         if backend == "c":
-            self._use(compiled_library(self._about, self._sources, MAIN))
+            self._use(compiled_library(self._about, self._sources, runs.MAIN))
         elif backend == "numpy":
             self._price = math.inf
         else:
@@ -122,7 +123,7 @@ class Motion:
         if self._kernels is None and pays(self._spent, self._price):
             self._price = math.inf
             with suppress(RunError):  # no compiler
-                self._use(compiled_library(self._about, self._sources, MAIN))
+                self._use(compiled_library(self._about, self._sources, runs.MAIN))
 
     def start(self, p: FloatArray, given: Mapping[int, float]) -> FloatArray:
         """The initial state with its sensitivities, (ny (1 + k),); `given` states, by their index,
@@ -184,20 +185,15 @@ class Motion:
     ) -> None:
         """Fill the rows of states and of what is measured, as far as steps go."""
         place = _Place(self._module, self._kernels, p)
-        ny, y = len(start), start.copy()
-        lost, slopes = np.zeros(ny), np.zeros((len(DOP853.nodes), ny))
-        found[0], slopes[0] = start, place.derivative(t[0], y, inputs[0])
-        run = Bounds(atol, self._rtol, math.inf)
-        at = Progress(float(t[0]), length=float(t[1] - t[0]))
-        advance = place.stretch(run, at, self._places, y, lost, slopes)
+        lost = np.zeros(len(start))
+        begun = Start(start.copy(), place.derivative(t[0], start, inputs[0]), lost)
+        run, at = Bounds(atol, self._rtol, math.inf), Progress(float(t[0]), length=t[1] - t[0])
+        steps = place.steps(run, at, begun, self._places, t[1:])
         most = MOST + MORE * len(t)
-        ends = range(1, len(t)) if len(inputs) > 1 or self._varies else [len(t) - 1]
-        first = 1
-        for number, end in enumerate(ends):
-            count = end + 1 - first
-            if advance(inputs[number], t[first : end + 1], found[first : end + 1], most) < count:
-                break
-            first = end + 1
+        ends = t[1:] if len(inputs) > 1 or self._varies else t[-1:]
+        all(steps.go_on(float(end), u, most) for end, u in zip(ends, inputs, strict=False))
+        first = 1 + steps.records.passed
+        found[0], found[1:first] = start, steps.kept.rows[: first - 1]
         if self._of:
             for i in range(first):
                 seen[i] = place.measured(
@@ -229,72 +225,116 @@ class _Place:
         assert self._measured is not None
         return np.asarray(self._measured(float(t), y, self._p, u))
 
-    def stretch(
+    def steps(
+        self, run: Bounds, at: Progress, start: Start, places: Any, times: FloatArray
+    ) -> "_Steps":
+        """What makes steps from a start, with rows at the times."""
+        if self._library is None or self._constants is None:
+            return _InPython(self, run, at, start, places, times)
+        mechanism = Mechanism(many=len(places) // 4, quaternions=places.ctypes.data)
+        mechanism.derivative.k = ctypes.addressof(self._constants)
+        mechanism.kept = places, self._constants
+        solver = SimpleNamespace(
+            t=at.t, y=start.state, f=start.slope, lost=start.lost, h_abs=at.length
+        )
+        stretch = Stretch(
+            *(solver, run.until, True, run.rtol, run.atol, run.longest, TOGETHER, False, False),
+            *(times, None, None, False, None),
+        )
+        method = runs.method(self._library.adaptive)
+        return _InC(method, mechanism, stretch)
+
+
+class _Steps:
+    """Steps from a start over stretches of time, by `run`, `at` and `records` of the engine; `kept`
+    has the arrays of these.
+    """
+
+    run: Any
+    at: Any
+    records: Any
+    start: Start
+    kept: Records
+
+    def go_on(self, until: float, inputs: FloatArray, most: int) -> bool:
+        """Go on to a time with these inputs; false if there is no step, or after `most`
+        derivatives.
+        """
+        self.run.until, why = until, MADE
+        while self.at.t < until and why == MADE and self.at.derivatives < most:
+            self.records.made = 0
+            why, start, kept = self.made(inputs), self.start, self.kept
+            if last := self.records.made:
+                start.state[:], start.lost[:] = kept.states[last - 1], kept.losses[last - 1]
+                start.slope[:] = kept.slopes[last - 1]
+        return not self.at.t < until
+
+    def made(self, inputs: FloatArray) -> int:
+        """Make steps; returns why they end."""
+        raise NotImplementedError
+
+
+class _InC(_Steps):
+    def __init__(self, method: strides.Method, of: Mechanism, stretch: Stretch) -> None:
+        self._call, self._given = method.call, strides.prepared(method, of, stretch)
+        given = self._given
+        self.run, self.at, self.records = given.run, given.at, given.records
+        self.start, self.kept = given.begun, given.kept
+        self._call.restype, self._call.argtypes = ctypes.c_int64, [_POINTER] * 4
+
+    def made(self, inputs: FloatArray) -> int:
+        self._given.system.inputs = inputs.ctypes.data
+        return int(self._call(*self._given.addresses))
+
+
+class _InPython(_Steps):
+    """Also what steps in Python are checked with: see `engine.adaptive_steps.Checks`."""
+
+    def __init__(
         self,
+        place: _Place,
         run: Bounds,
         at: Progress,
+        start: Start,
         places: Any,
-        y: FloatArray,
-        lost: FloatArray,
-        slopes: FloatArray,
-    ) -> Any:
-        """A function (inputs, times, rows, most) that goes on to the last of the times; it returns
-        the number of rows that it has filled.
-        """
-        library, constants = self._library, self._constants
-        if library is None or constants is None:
-            system = _InPython(self)
+        times: FloatArray,
+    ) -> None:
+        self._place, self._places, self._inputs = place, places, np.zeros(0)
+        self.run, self.at, self.start = replace(run, reaches=True), at, start
+        sizes = {"STATES": len(start.state), "count": len(times), "most": TOGETHER}
+        self.kept = self.records = with_room(Records, wide=0, times=times, **sizes)
+        given = self._derivative, at.t, start.state, math.inf
+        self._maker = DormandPrince8(*given, rtol=run.rtol, atol=run.atol)
 
-            def in_python(u: FloatArray, times: FloatArray, rows: FloatArray, most: int) -> int:
-                system.inputs, run.until = u, float(times[-1])
-                count = len(times)
-                given = (most, len(places) // 4, places, y, lost, slopes, count, times, rows)
-                with np.errstate(all="ignore"):
-                    return sampled(DOP853, system, run, at, *given)
+    def made(self, inputs: FloatArray) -> int:
+        self._inputs, self._maker.f = inputs, self.start.slope.copy()
+        self._maker.begin()
+        with np.errstate(all="ignore"):
+            return adaptive_steps(self._maker, self, self.run, self.at, self.start, self.kept)
 
-            return in_python
-        of = _System(ctypes.addressof(constants))
-        bounds, progress = filled(run), filled(at)
-        sizes = np.array([0, len(places) // 4, 0], np.int64)
-        call = library.sample
-        call.restype, call.argtypes = ctypes.c_int64, [_POINTER] * 10
-        records, arrays = (of, bounds, progress), (sizes, places, y, lost, slopes)
-
-        def compiled(u: FloatArray, times: FloatArray, rows: FloatArray, most: int) -> int:
-            of.inputs, bounds.until = u.ctypes.data, times[-1]
-            sizes[0], sizes[2] = most, len(times)
-            fixed = map(ctypes.addressof, records)
-            made: int = call(*fixed, *(x.ctypes.data for x in (*arrays, times, rows)))
-            return made
-
-        return compiled
-
-
-class _InPython:
-    """What steps in Python are given."""
-
-    def __init__(self, place: _Place) -> None:
-        self._place, self.inputs = place, np.zeros(0)
-
-    def derivative(self, t: float, y: FloatArray) -> FloatArray:
+    def _derivative(self, t: float, y: FloatArray) -> FloatArray:
         """The rates of the states; nan where there are none."""
         try:
-            return self._place.derivative(t, y, self.inputs)
+            return self._place.derivative(t, y, self._inputs)
         except (ValueError, ArithmeticError):
             return np.full(len(y), np.nan)
 
+    def begins(self) -> None:
+        """A step begins."""
 
-def _sources(program: Any, interface: Interface) -> Mapping[str, str]:
-    """The C sources of the kernels, and of the steps."""
-    # Imported here because fits whose library is in the store do without the printer.
-    from eomgen.engine.printed import c_source
-    from eomgen.subset.languages import C
+    def is_usual(self) -> bool:
+        """What is not is found by its states."""
+        return True
 
-    context = {
-        "prefix": interface.name,
-        "main": c.MAIN,
-        "states": len(interface.states),
-        "engine": C.prelude + c_source([("sampled", {"method": DOP853})]),
-    }
-    main = render(c.TEMPLATES, "sampled.c.jinja", context)
-    return {**c.library(program, interface), MAIN: main}
+    def placed(self, t: float, y: FloatArray) -> bool:
+        """Normalise the quaternions of a state."""
+        return normalised(len(self._places) // 4, self._places, y)
+
+    def seen(self, at: Progress, y: FloatArray, raw: FloatArray, last: FloatArray) -> int:
+        """Nothing ends a step, but it must have a slope at its end."""
+        slopes = self._maker.slopes
+        return MADE if slopes is not None and np.isfinite(slopes).all() else UNUSUAL
+
+    def keeps(self, i: int, at: Progress, last: FloatArray) -> bool:
+        """Each is."""
+        return True

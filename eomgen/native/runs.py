@@ -1,7 +1,7 @@
 """Whole steps of a method in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from eomgen.base.templating import render
@@ -20,16 +20,21 @@ from eomgen.run.integrators.strides import OF_STATE
 MAIN = "runs.c"
 
 
-def sources(program: Program, interface: Interface) -> Mapping[str, str]:
-    """The C sources of the derivative and of the methods that step with it."""
+def sources(
+    program: Program, interface: Interface, beside: Iterable[str] = (), *, equal: bool = True
+) -> Mapping[str, str]:
+    """The C sources of the derivative, of outputs `beside` it, and of the methods that step with
+    it: DOP853 and, if wanted, those with equal steps.
+    """
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
     from eomgen.subset.languages import C
 
     of_contacts = contact_runs.values(**contact_runs.sizes(interface))
     switches = any(function.name in OF_STATE for function in interface.functions)
-    program, interface = restricted(program, interface, ("derivative",))
-    roots = [*equal_steps.roots_of(*equal_steps.METHODS), ("equal_steps", {})]
+    program, interface = restricted(program, interface, ("derivative", *beside))
+    own = [*equal_steps.roots_of(*equal_steps.METHODS), ("equal_steps", {})]
+    roots = [*(own if equal else ())]
     roots += [(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")]
     roots += [("within", {}), *strides.ROOTS]
     if of_contacts["contacts"]:
@@ -41,7 +46,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "last": DOP853.last,
-        "equal": True,
+        "equal": equal,
         "adaptive": True,
         "whole_runs": switches or of_contacts["contacts"],
         "engine": C.prelude + c_source(roots),
@@ -53,20 +58,21 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     return {**c.library(program, interface), MAIN: main}
 
 
-def _method(call: Any, *memory: str) -> strides.Method:
+def method(call: Any, *memory: str) -> strides.Method:
+    """DOP853, by a function that makes its steps."""
     return strides.Method(call, memory or ("h_abs", "f", "lost"), (), 7, within)
 
 
 def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Steps of DOP853."""
-    return strides.steps(_method(library.adaptive), of, stretch)
+    return strides.steps(method(library.adaptive), of, stretch)
 
 
 def held(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Those by which contacts are held between steps by Taylor series."""
-    return strides.steps(_method(library.held_steps, "h_abs", "lost"), of, stretch)
+    return strides.steps(method(library.held_steps, "h_abs", "lost"), of, stretch)
 
 
 def through(of: Mechanism, library: ctypes.CDLL, run: WholeRun) -> Array | None:
     """The rows of a run by DOP853, see `run.compiled.Compiled`."""
-    return strides.rows_of(_method(library.through), of, run)
+    return strides.rows_of(method(library.through), of, run)

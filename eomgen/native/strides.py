@@ -67,7 +67,7 @@ class _Checks(ctypes.Structure):
     )
 
 
-class _Given(NamedTuple):
+class Given(NamedTuple):
     """What C is given of steps, of which all else lives as long; and what it records of them, of
     branches and of constraints.
     """
@@ -92,7 +92,8 @@ class _Given(NamedTuple):
         return tuple(map(ctypes.addressof, self[:4]))
 
 
-def _given(method: Method, of: Mechanism, stretch: Stretch) -> _Given:
+def prepared(method: Method, of: Mechanism, stretch: Stretch) -> Given:
+    """What C is given of steps."""
     solver, most = stretch.solver, stretch.most
     watched, held, ny = stretch.watched, stretch.constrained, len(solver.y)
     seen = _Checked.of(watched, ny) if watched else _unchecked(ny)
@@ -112,7 +113,7 @@ def _given(method: Method, of: Mechanism, stretch: Stretch) -> _Given:
     slope = getattr(solver, "f", solver.y)
     begun = Start(*map(np.ascontiguousarray, (solver.y, slope, solver.lost)))
     made = filled(begun)
-    return _Given(
+    return Given(
         *(checks, at, made, records, kept, begun, system, run, seen),
         *(switched, values, switches, margins),
     )
@@ -122,7 +123,7 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     """Steps of a method for a mechanism."""
     solver, most, touched = stretch.solver, stretch.most, stretch.touched
     is_held = touched is not None and touched.now.holds.any()
-    given = _given(method, of, stretch)
+    given = prepared(method, of, stretch)
     if method.call.argtypes is None:
         method.call.restype, method.call.argtypes = _WHOLE, [_POINTER] * 4
     why = method.call(*given.addresses)
@@ -157,7 +158,7 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
 
 def rows_of(method: Method, of: Mechanism, run: WholeRun) -> Array | None:
     """The rows of a run by a method, see `run.compiled.Compiled`."""
-    given = _given(method, of, run.stretch)
+    given = prepared(method, of, run.stretch)
     records: Any = given.records
     given.kept.rows[0], records.passed = run.stretch.solver.y, 1
     if method.call.argtypes is None:
