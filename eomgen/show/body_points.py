@@ -10,7 +10,7 @@ from eomgen.model.bodies import Body
 from eomgen.model.model import Model
 from eomgen.scene.constraints import ConstraintTable
 from eomgen.scene.effects.base import EffectTable
-from eomgen.scene.effects.elements import Disc, Link, Touching
+from eomgen.scene.effects.elements import Disc, Link, Round, Touching
 from eomgen.scene.joints.base import WORLD
 from eomgen.show.effect_elements import discs_of_constraints, elements_of_constraints
 
@@ -67,6 +67,8 @@ def points_of(model: Model) -> list[BodyPoints]:
         if isinstance(element, Link):
             for end in (element.start, element.end):
                 add(names[end.body], end.at, "others")
+        elif isinstance(element, Round) and element.body >= 0:
+            found[element.body].spheres.append((element.at, element.radius))
     for disc in discs_of_constraints(model, 1.0):
         found[index[disc.body]].discs.append(disc)
     for point in model.points:

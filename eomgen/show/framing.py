@@ -21,6 +21,9 @@ MARGIN = 1.1
 SMALL = 0.36
 """If at some time the bodies fill less than this part of the height and of the width of a view of
 the whole motion, the camera follows."""
+LONE = 0.02
+"""The same for bodies that all move by themselves, as stones that are thrown: their paths are what
+is to be seen."""
 FEWEST, SOUNDINGS = 60, 300
 """Number of samples at which the bounds of the bodies are found, with many points and with few."""
 ALONE = 1.6
@@ -170,7 +173,8 @@ def framed(
     elif mode is None and (camera.center is not None or camera.height is not None):
         mode = "fixed"
     elif mode is None:
-        followed = None if len(fixed) else _worth_following(bounds, size, leading)
+        small = LONE if len(leading) == len(bodies) else SMALL
+        followed = None if len(fixed) else _worth_following(bounds, size, leading, small)
         mode = "fit" if followed is None else "follow"
     if mode == "follow":
         if followed is None:
@@ -243,12 +247,14 @@ def _sized(
     )
 
 
-def _worth_following(bounds: Bounds, size: Array, leading: Sequence[int]) -> int | None:
-    """The body to follow, if the bodies are small in a view of the whole motion and larger in one
-    that follows.
+def _worth_following(
+    bounds: Bounds, size: Array, leading: Sequence[int], small: float
+) -> int | None:
+    """The body to follow, if the bodies fill less than the part `small` of a view of the whole
+    motion, and more of one that follows.
     """
     share = bounds.least_share(size)
-    if share >= SMALL or not leading:
+    if share >= small or not leading:
         return None
     body = _steadiest(bounds, leading)
     _, followed = bounds.view(body)

@@ -34,6 +34,8 @@ WIDTH = 0.11
 """Width of a link relative to its length."""
 WIDEST, NARROWEST = 1.6, 0.6
 """A body is drawn at most so much wider or narrower than a median one, for its mass."""
+PLANETS = 3.0
+"""The same of particles."""
 BOB = 0.3
 """A body whose extent about its centre of mass is smaller than this part of its distance from the
 joint is drawn as a bob at the end of a rod."""
@@ -69,12 +71,12 @@ class Inventor:
     mass: float
     extent: tuple[float, float] = (0.0, math.inf)
 
-    def number(self, body: Body) -> float:
-        """How much larger than a median body it is drawn, for its mass."""
+    def number(self, body: Body, most: float = WIDEST) -> float:
+        """How much larger than a median body it is drawn, for its mass, at most `most`."""
         mass = self.model.value(body.mass)
         if not (mass > 0 and self.mass > 0):
             return NARROWEST
-        return min(WIDEST, max(NARROWEST, float(np.cbrt(mass / self.mass))))
+        return min(most, max(WIDEST * NARROWEST / most, float(np.cbrt(mass / self.mass))))
 
 
 def inventor_of(model: Model, size: float, spread: float) -> Inventor:
@@ -100,6 +102,8 @@ def invented_shapes(
         shapes = touching
     elif slides(body.joint, model.dimensions):
         shapes = [*_rods(inventor, body, arms, color), *_slider(inventor, body, color)]
+        reach = CARRIAGE[0] * inventor.size * inventor.number(body) / 2
+        shapes += _to_others(inventor, points, reach, color)
     elif not arms:
         shapes = [] if points.discs else [*_alone(inventor, body, points, color)]
     elif len(arms) == 1 and len(points.joints) == 1 and not _is_thick(model, body, arms[0]):
@@ -271,15 +275,24 @@ def _hub(
 def _alone(inventor: Inventor, body: Body, points: BodyPoints, color: str) -> Iterator[Shape]:
     """A body without arms: as large as its inertia says, or a particle."""
     model = inventor.model
-    if is_drawn(gyration(model, body)):
+    if model.dimensions == 3 and points.carries:  # a ring of a gimbal, which must hide nothing
+        yield _ball(model, 0.9 * WIDTH * inventor.number(body) * inventor.size, color)
+    elif is_drawn(gyration(model, body)):
         yield from _solid(inventor, body, color, *inventor.extent)
-        zero = constant(*[0.0] * model.dimensions)
-        reach = 2 * gyration(model, body)
-        far = [r for r in points.others if reach < length_of(model, r) < 20 * reach]
-        yield from (_rod(inventor, body, zero, r, shade(color)) for r in far)
+        yield from _to_others(inventor, points, 2 * gyration(model, body), color)
     else:
-        radius = PARTICLE * inventor.number(body) * inventor.size
+        radius = PARTICLE * inventor.number(body, PLANETS) * inventor.size
         yield _ball(model, min(max(radius, inventor.extent[0]), inventor.extent[1]), color)
+
+
+def _to_others(inventor: Inventor, points: BodyPoints, reach: float, color: str) -> Iterator[Shape]:
+    """Rods from the centre of mass to what effects hold, where a body does not reach so far."""
+    model = inventor.model
+    zero = constant(*[0.0] * model.dimensions)
+    for r in points.others:
+        if reach < length_of(model, r) < 20 * reach:
+            width = Constant(WIDTH * NARROWEST * min(inventor.size, length_of(model, r)))
+            yield Rod(type="rod", start=zero, end=r, width=width, color=shade(color))
 
 
 def _ball(model: Model, radius: float, color: str) -> Shape:

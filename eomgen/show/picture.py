@@ -22,7 +22,13 @@ from eomgen.scene.effects.elements import (
 )
 from eomgen.scene.joints.base import WORLD, kinds_of
 from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
-from eomgen.show.body_points import BodyPoints, points_of, typical_length
+from eomgen.show.body_points import (
+    BodyPoints,
+    gyration,
+    is_drawn,
+    points_of,
+    typical_length,
+)
 from eomgen.show.colours import body_colours
 from eomgen.show.connections import hidden_rods
 from eomgen.show.effect_elements import SYMBOL, elements_of, elements_of_constraints
@@ -109,7 +115,8 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
     points = points_of(model)
     size = typical_length(model, points)
     elements = elements_of(model, size)
-    seen_whole = any(_is_landmark(element) for element in elements)
+    lone = all(body.parent < 0 and not is_drawn(gyration(model, body)) for body in model.bodies)
+    seen_whole = lone or any(_is_landmark(element) for element in elements)
     inventor = inventor_of(model, size, spread if seen_whole else 0.0)
     if seen_whole and size < SMALLEST * spread:
         size = SMALLEST * spread

@@ -116,6 +116,31 @@ def test_a_camera_follows_what_goes_far_and_nothing_that_is_held() -> None:
     assert pendulum.check(flight(pendulum, 30.0)).mode == "fit"
 
 
+def test_the_whole_path_of_what_moves_by_itself_is_in_the_picture() -> None:
+    """Stones without a size, one or two; a long flight of a ball is followed, as above."""
+    for bodies in (1, 2):
+        stones = "".join(
+            f"""
+[[bodies]]
+name = "stone_{k}"
+mass = 1.0
+[[joints]]
+name = "flight_{k}"
+type = "particle"
+parent = "world"
+child = "stone_{k}"
+[[effects]]
+type = "external_force"
+name = "push_{k}"
+body = "stone_{k}"
+force = [{k}, 1]
+"""
+            for k in range(bodies)
+        )
+        run = eomgen.simulate(f'name = "stones"{stones}', samples=21)
+        assert run.motion.framing.view.mode == "fit"
+
+
 def test_a_scene_may_say_what_its_camera_does() -> None:
     """Each mode and each key."""
     path = UNTUNED / "projectile.toml"

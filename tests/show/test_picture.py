@@ -24,6 +24,7 @@ from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
 from eomgen.show.drawing import Dot, Line, Point
 from eomgen.show.marks import marks_of
+from eomgen.show.observe import planes_of
 from eomgen.show.of_run import world_points
 from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of, shapes_of
@@ -281,6 +282,66 @@ def test_a_page_draws_the_lines_of_figures() -> None:
             for line in mark.symbol
         ]
         assert on_page == shown and len(data["symbols"]) <= len(data["marks"])
+
+
+CART = """
+name = "cart"
+bodies = [
+    { name = "cart", mass = 9.0, inertia_com = 1.0 },
+    { name = "wheel", mass = 1.0, inertia_com = 0.001 },
+    { name = "load", mass = 1.0, inertia_com = 0.1 },
+]
+joints = [
+    { name = "flight", type = "free", child = "cart" },
+    { name = "axle", type = "revolute", parent = "cart", child = "wheel", r_parent = [1, -1] },
+    { name = "rail", type = "prismatic", parent = "cart", child = "load", axis = [1, 0] },
+]
+initial = { q = { cart_x = 0.0 }, guess = { cart_y = 2.0 } }
+[[effects]]
+type = "spring"
+name = "coil"
+body_1 = "cart"
+body_2 = "load"
+at_2 = [5, 0]
+stiffness = 1
+[[constraints]]
+type = "rolling"
+name = "tyre"
+body = "wheel"
+radius = 0.4
+normal = [3, 4]
+other_at = [1, 1]
+"""
+
+
+def test_wheels_stand_on_the_ground_and_bodies_reach_what_holds_them() -> None:
+    """A wheel has the radius with which it rolls, whatever its inertia, and the plane on which it
+    rolls is drawn; a slider leads to its spring; of what gravitation attracts the heavier is
+    larger.
+    """
+    model, picture = picture_in(CART)
+    drawn = picture.valued(model.defaults)
+    (disc,) = (shape for shape in drawn.bodies[1].shapes if isinstance(shape, Disc))
+    assert number(disc.radius) == 0.4
+    (plane,) = planes_of(drawn)
+    np.testing.assert_allclose([*plane.normal, plane.offset], [0.6, 0.8, 1.4])
+    assert any(np.allclose(tip, [5.0, 0.0]) for tip in ends(drawn, 2))
+    model, picture = picture_in(PAIR)
+    drawn = picture.valued(model.defaults)
+    small, large = (number(body.shapes[0].radius) for body in drawn.bodies)
+    assert large > 2 * small
+
+
+PAIR = """
+name = "pair"
+bodies = [{ name = "moon", mass = 1.0 }, { name = "planet", mass = 100.0 }]
+joints = [
+    { name = "a", type = "particle", parent = "world", child = "moon" },
+    { name = "b", type = "particle", parent = "world", child = "planet" },
+]
+effects = [{ type = "pairwise", name = "pull", gravitation = 1.0 }]
+initial = { q = { moon_x = 1.0 } }
+"""
 
 
 def test_springs_end_where_they_are_held() -> None:

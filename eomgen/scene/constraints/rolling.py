@@ -7,7 +7,9 @@ contact point is -∇h(n) from the centre. ∇h changes at right angles to n, so
 the normal velocity of the material point in contact.
 """
 
+import math
 from collections.abc import Iterator
+from functools import reduce
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -16,11 +18,13 @@ from eomgen.base.errors import SceneError
 from eomgen.language.conditions import Condition
 from eomgen.language.formula import ZERO, Apply
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
+from eomgen.language.rewriting import constant, times, total
 from eomgen.scene.constraints.base import Linkage, Row
 from eomgen.scene.constraints.between import OnOther, across, checked_direction, unit
 from eomgen.scene.effects.base import Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.elements import WORLD_INDEX, Layout, Plane, Round
 from eomgen.scene.effects.touching import Touch, normal_loads, point_loads, tangents
 from eomgen.scene.effects.vectors import add, dot, negative, scale, sub
 
@@ -129,6 +133,20 @@ other_at = [0, -1.4]
             words = "{:g} is not less than other_radius, {:g}, inside which it rolls"
             shown = (self.radius, self.other_radius)
             yield Condition(f"{location}.radius", rest, words, shown, strict=True)
+
+    def elements(self, layout: Layout) -> Iterator[Plane | Round]:
+        """What is fixed in the world, the plane or the sphere, and a wheel or ball that rolls."""
+        other, body = layout.bodies[self.other], layout.bodies[self.body]
+        if other == WORLD_INDEX and self.other_radius is None:
+            length = math.hypot(*self.normal)
+            normal = [n / length for n in self.normal]
+            parts = (times(n, x) for n, x in zip(normal, self.other_at, strict=True))
+            yield Plane(self.name, other, constant(*normal), reduce(total, parts))
+        elif other == WORLD_INDEX and self.other_radius is not None and not self.inside:
+            yield Round("ball", self.name, other, self.other_at, self.other_radius)
+        if self.radius is not None and not self.axis:
+            kind: Literal["wheel", "ball"] = "wheel" if layout.dimensions == 2 else "ball"
+            yield Round(kind, self.name, body, self.at, self.radius)
 
     def row_names(self, dimensions: int) -> list[tuple[str, str]]:
         """The normal row, then one row in the plane, two in space."""
