@@ -127,8 +127,8 @@ class Routed:
 
     route: "Route | None" = option(
         None,
-        "route to the equations; auto is the one with the fewest operations that is accurate "
-        "enough",
+        "route, the algorithm that gives the accelerations; auto is the one with the fewest "
+        "operations that is accurate enough",
         none=OWN,
         choices=("auto", *ROUTES),
     )
@@ -261,8 +261,9 @@ class SweepOptions(Method):
     source: "Source"
     vary: "Design | Mapping[str, Sequence[float] | FloatArray]" = field(
         metadata=about(
-            "lists of values by name of a parameter, a state or an input, one for each member, "
-            "`<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`",
+            "lists of values by name of a parameter, a state or an input, one for each run, a "
+            "member of the sweep, `<name>_deg` of an angle in degrees; or `grid(...)` or "
+            "`sampled(...)`",
             flag=None,
         )
     )
@@ -393,7 +394,7 @@ class VerifyOptions:
     )
     inputs: "Inputs | None" = _inputs(
         "constants, formulas or a table in place of inputs, as for `simulate`; others are "
-        "sampled, and 0 in the scene's own run"
+        "sampled, and 0 in the run that the scene describes"
     )
 
 

@@ -44,8 +44,7 @@ def print_table(name: str, made: Measurement) -> None:
     print_wrapped("    reference: ", f"{truth.origin} ({_time(truth.seconds)})")
     print_wrapped(
         "    ",
-        f"its own error {truth.error:.1g} of the motion's scale: errors are resolved down to "
-        f"{floor:.1g} on",
+        f"its own relative error {truth.error:.1g}: errors are resolved down to {floor:.1g} on",
     )
     print_wrapped("    energy: ", _energy(bench))
     if bench.problem.quaternions:
@@ -120,7 +119,7 @@ def _print_troubles(reasons: Mapping[tuple[str, str, str], Sequence[Work]]) -> N
             settings += f" to {works[-1].setting.brief.split()[1]}"
         if status == "wrong":
             worst = max(work.error for work in works)
-            cause = f"reported success, but the error is up to {worst:.2g} of the motion's scale"
+            cause = f"reported success, but the relative error is up to {worst:.2g}"
         print_wrapped(f"        {method}, {settings}: ", f"{WORDS[status]}: {cause}")
 
 
@@ -162,8 +161,8 @@ def _print_reading(bench: Bench, works: Sequence[Work]) -> None:
     if wrong:
         print_wrapped(
             "    ",
-            f"{len(wrong)} of {len(works)} runs reported success and are wrong: their errors are "
-            "at least a tenth of the motion's scale",
+            f"{len(wrong)} of {len(works)} runs reported success and are wrong: their relative "
+            "errors are at least a tenth",
         )
     for method, ratio in saved_by_jacobian(works).items():
         print_wrapped(

@@ -56,7 +56,7 @@ def print_estimate(found: "Estimate") -> None:
     print(f"    from a second run, {second.setting.options}, which took {second.seconds:.2g} s")
     if found.most >= WRONG:
         _warn(
-            f"by its error estimate this run is wrong by {found.most:.1g} of the motion's scale at "
+            f"by its error estimate this run has a relative error of {found.most:.1g} at "
             f"t = {found.at:.4g} s; {BETTER}"
         )
 
@@ -76,7 +76,7 @@ def warn_of_energy(run: Run) -> None:
 
 
 def _error(value: float) -> str:
-    return f"{value:.1e} of the motion's scale" if math.isfinite(value) else "none: a single run"
+    return f"{value:.1e}, relative," if math.isfinite(value) else "none: a single run"
 
 
 def _most(choice: "Choice") -> str:

@@ -142,11 +142,11 @@ class Members:
         "normal:MEAN:DEVIATION",
         value="NAME=…",
     )
-    sample: int | None = option(None, "draw N members, instead of a grid")
+    sample: int | None = option(None, "draw N runs, instead of a grid")
     seed: int = option(0, "seed of the sample", check=check_seed)
     of: str | None = option(None, "state or output in the figure (the first)")
     statistics: bool = option(
-        False, "also write mean, deviation and quantiles over the members, at each kept time"
+        False, "also write mean, deviation and quantiles over the runs, at each kept time"
     )
     workers: int | None = option(None, "number of processes (one per core)")
 

@@ -76,7 +76,7 @@ def sweep(given: Arguments) -> int:
     except KeyboardInterrupt:
         raise InterruptedRunError(
             f"{model.name}: interrupted; {kept_members(folder)} of {len(plan.design.values)} "
-            f"members are kept in {folder}, and the same command goes on with the others"
+            f"runs are kept in {folder}, and the same command goes on with the others"
         ) from None
     save_sweep(found, of, table, figure, force=given.force)
     written = [folder, table, figure]
@@ -176,9 +176,9 @@ def _report(found: Ensemble, of: str) -> None:
     """Print how many members finished, why others did not, and the spread of a quantity."""
     ended = int(found.finished.sum())
     varied = ", ".join(found.design.names)
-    print(f"{found.scene}: {len(found)} members, {varied} varied; {ended} finished")
+    print(f"{found.scene}: {len(found)} runs, {varied} varied; {ended} finished")
     lines = [
-        f"member {i} {found.status[i]}: {found.messages[i]}"
+        f"run {i} {found.status[i]}: {found.messages[i]}"
         for i in np.flatnonzero(~found.finished).tolist()[:FEW]
     ]
     left = len(found) - ended - len(lines)

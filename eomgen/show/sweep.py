@@ -53,7 +53,7 @@ def draw_sweep(found: Ensemble, of: str) -> Figure:
         _histogram(parts[0], values, label)
     ended = int(found.finished.sum())
     parts[0].set_title(
-        f"{plain(found.scene)}: {ended} of {len(found)} members finished",
+        f"{plain(found.scene)}: {ended} of {len(found)} runs finished",
         pad=None if ended == len(found) else ABOVE_LEGEND,
     )
     if fan:
@@ -156,7 +156,7 @@ def _histogram(to: Axes, values: FloatArray, label: str) -> None:
         to.hist(there, bins=bins, color=PALETTE[0], edgecolor="white", linewidth=0.4)
     to.yaxis.set_major_locator(MaxNLocator(integer=True))
     to.set_xlabel(label)
-    to.set_ylabel("members")
+    to.set_ylabel("runs")
 
 
 def _fan(to: Axes, found: Ensemble, of: str) -> None:
@@ -171,7 +171,7 @@ def _fan(to: Axes, found: Ensemble, of: str) -> None:
         color=PALETTE[0],
         alpha=0.25,
         linewidth=0,
-        label="5 to 95 % of the members",
+        label="5 to 95 % of the runs",
     )
     to.plot(found.times, middle, color=PALETTE[0], linewidth=2, label="median")
     ends = [_last(found.times, line) for line in column]

@@ -75,7 +75,7 @@ const makePanels = (actions) => {
     const id = `effect-${effect.name}`;
     const box = element("input", { type: "checkbox", id, "data-name": effect.name, checked: true });
     const share = Math.round((100 * effect.operations) / total);
-    const cost = effect.operations > 0 ? `${effect.operations} operations, ${share || "< 1"} %` : "no operations";
+    const cost = effect.operations > 0 ? `${share || "< 1"} % of the arithmetic` : "costs nothing";
     const set = () => actions.parameter(effect.switch, box.checked ? 1 : 0);
     box.dataset.switch = own[effect.switch].name;
     box.setChecked = (checked) => {
@@ -89,8 +89,7 @@ const makePanels = (actions) => {
     return box;
   });
   byId("effects-panel").hidden = !DATA.live || !effectBoxes.length;
-  byId("effects-total").textContent = `All effects: ${DATA.operations} operations for a derivative. `
-    + "Beside each effect: what leaving it out saves.";
+  byId("effects-total").textContent = "Beside each effect: how much less is to be computed without it.";
 
   // ---- Method and step ----
 

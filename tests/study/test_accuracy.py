@@ -381,7 +381,7 @@ def test_the_table_says_what_it_must(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["accuracy", "pendulum", *arguments, "-o", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     assert re.search(r"one derivative takes [\d.]+ µs, one Jacobian [\d.]+ µs; generated in", text)
-    assert re.search(r"its own error \de-1\d of the motion's scale", " ".join(text.split()))
+    assert re.search(r"its own relative error \de-1\d", " ".join(text.split()))
     assert re.search(r"euler +dt 0.08 +wrong", text)
     assert re.search(r"rk4 +4   (3\.[89]|4\.[01])\d over dt", text)
     assert re.search(r"1e-06  (rk4 at dt|DOP853 at rtol)", text)

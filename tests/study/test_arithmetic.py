@@ -369,7 +369,7 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
             assert errors.worst < 500
             assert errors.failed == 0
             assert len(errors.ulps) == len(sample.y)
-    assert [s.kind for s in found.samples] == ["seeded", "own run"]
+    assert [s.kind for s in found.samples] == ["seeded", "scene's run"]
 
 
 def test_solution_by_hand_keeps_what_a_light_cart_loses() -> None:
@@ -448,7 +448,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     module: Any = load_module(python_module(system))
     units = [c.unit for c in system.model.velocities]
     truth = Truth(system.model)
-    for kind in ("seeded", "own run"):
+    for kind in ("seeded", "scene's run"):
         there = [row for row in rows if row["state_kind"] == kind]
         y = np.array([[float(row[name]) for name in module.STATES] for row in there])
         found = np.array([module.derivative(0.0, row)[4:] for row in y]).T

@@ -139,7 +139,7 @@ def test_what_is_said_of_rows_before_the_end(
     scene.write_text(text("crank"))
     assert main(["simulate", str(scene), "--accuracy", "1e-6", "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
-    assert "of the motion's scale at the end, at most" in out and "before, at t =" in out
+    assert ", relative, at the end, at most" in out and "before, at t =" in out
 
 
 class Clock:

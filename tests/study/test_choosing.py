@@ -267,7 +267,7 @@ def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         one = made(name, "--accuracy", "5e-6", *more)
         out = capsys.readouterr().out
         (options,) = re.findall(r"chosen: (--integrator .*)", out)
-        assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", out)
+        assert re.search(r"error estimate \S+, relative, at the end, at most", out)
         two = made(f"{name} again", *options.split(), "--samples", "300")
         assert len(one) == int(more[-1]) and np.array_equal(two[-1], one[-1])
         assert name == "few" or np.array_equal(one, two)
@@ -301,8 +301,8 @@ def test_a_wrong_run_is_reported(
     bounds = ["--rtol", "1e-3", "--atol", "1e-6", "--integrator", integrator]
     assert main(["simulate", str(scene), *bounds, "--estimate", "-o", str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", said.out)
-    assert "warning: by its error estimate this run is wrong by" in said.err
+    assert re.search(r"error estimate \S+, relative, at the end, at most", said.out)
+    assert "warning: by its error estimate this run has a relative error of" in said.err
     assert "warning: exact motion conserves its energy, but this run is off by" in said.err
 
 

@@ -472,8 +472,8 @@ def test_verify_says_saves_and_repeats(tmp_path: Path, capsys: pytest.CaptureFix
     first = [path.read_bytes() for path in paths]
     data = json.loads(first[1])
     assert data["passed"] and len(data["states"]) > 8
-    own = [state["t"] for state in data["states"] if state["state"].startswith("own run")]
-    assert f"own run followed to t = {max(own):.4g} s" in text
+    own = [state["t"] for state in data["states"] if state["state"].startswith("scene's run")]
+    assert f"the scene's run followed to t = {max(own):.4g} s" in text
     assert {"y", "vd", "error_ulps", "condition"} <= set(data["states"][0])
     assert str(tmp_path).encode() not in first[0] + first[1]
     assert main(arguments) == 0 and [path.read_bytes() for path in paths] == first

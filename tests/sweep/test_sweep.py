@@ -321,7 +321,7 @@ def test_a_member_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixt
         == 0
     )
     said = capsys.readouterr().out
-    assert "2 members, bob_mass varied; 1 finished" in said and "member 0 refused: " in said
+    assert "2 runs, bob_mass varied; 1 finished" in said and "run 0 refused: " in said
     table = (tmp_path / "pendulum_sweep.csv").read_text("utf-8")
     rows = list(csv.DictReader(table.splitlines()))
     assert [row["status"] for row in rows] == ["refused", "finished"]

@@ -167,7 +167,7 @@ def measure(bench: Bench, setting: Setting, run_time: float) -> Work:
     wrong = not found < WRONG
     reason = first.trajectory.message
     if wrong:
-        reason = f"reported success, but is {found:.2g} of the motion's own scale off"
+        reason = f"reported success, but its relative error is {found:.2g}"
     quaternion_defect = defect.largest if watched else math.nan
     work = Work(
         setting,

@@ -1,7 +1,7 @@
 """The forward error of the accelerations from each route, against a solution in 60 digits.
 
 It compares every route that the model admits and `numpy.linalg.solve(M, F - V - G)` with the
-module's own terms, at seeded random states and at states of the scene's own run: operations, time,
+module's own terms, at seeded random states and at states of the scene's run: operations, time,
 and forward error of v̇ in units in the last place (see `ulps`). Inputs are 0, and rigid contacts
 exert no force.
 """
@@ -124,7 +124,7 @@ def arithmetic(
     single: bool = False,
     progress: Progress = lambda fraction: None,
 ) -> Arithmetic:
-    """Compare all solvers at `states` seeded states and as many states of the scene's own run,
+    """Compare all solvers at `states` seeded states and as many states of the scene's run,
     which is made as `wanted`. With `single`, compare them in float32, too, at the same states
     rounded to float32.
 

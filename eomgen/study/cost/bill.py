@@ -253,7 +253,7 @@ def _changes(
 ) -> tuple[float, list[Change | None]]:
     """The extent of the scene's motion, m, and how far each variant's motion departs from it.
 
-    The runs share the time allowed; none goes beyond the end of the scene's own run.
+    The runs share the time allowed; none goes beyond the end of the scene's run.
     """
     count = 1 + sum(made is not None for made in changed)
     shares = _shares(seconds, count)

@@ -76,7 +76,7 @@ class Change:
 def run(
     wanted: Simulation, module: GeneratedModule, seconds: float, until: float, progress: Progress
 ) -> Run:
-    """A scene's own run, with its inputs at 0, limited to `seconds` of wall time and to time
+    """A scene's run, with its inputs at 0, limited to `seconds` of wall time and to time
     `until`.
 
     It uses the `wanted` integrator, step and tolerances, but none below `FINEST`, which is enough

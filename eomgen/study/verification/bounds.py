@@ -40,8 +40,8 @@ from eomgen.study.verification.ulps import group_scales
 T = TypeVar("T")
 BOUND, IN_LINE, AMPLIFIED = 450.0, 450e3, 10.0
 """Ulps: 1e-13 and 1e-10; and a factor of the change by one ulp in the data."""
-OWN = "own run"
-"""The kind of states sampled from the scene's own run."""
+OWN = "scene's run"
+"""The kind of states sampled from the scene's run."""
 ANYWHERE = ("fast", "still", "random", OWN)
 """Kinds of states where bodies are in line only by chance."""
 SOLVING = 10.0

@@ -30,7 +30,7 @@ def report(found: Verified, horizon: Horizon | None = None) -> list[str]:
     if found.left_out:
         lines += _wrapped("", f"{found.left_out} states have no finite acceleration, left out")
     if OWN in counts:
-        lines += _wrapped("", f"own run followed to t = {found.until:.4g} s, inputs 0")
+        lines += _wrapped("", f"the scene's run followed to t = {found.until:.4g} s, inputs 0")
     for note in found.notes:
         lines += _wrapped("", note)
     if horizon is not None:
@@ -119,7 +119,7 @@ def evidence(found: Verified, horizon: Horizon | None, module: str) -> dict[str,
             for check in found.checks
         ],
         "notes": [*found.notes, *([horizon.words] if horizon else [])],
-        "kinds": {**KINDS, OWN: "of the scene's own run, inputs 0"},
+        "kinds": {**KINDS, OWN: "of the scene's run, inputs 0"},
         "names": list(found.states),
         "units": list(found.units),
         "left_out": found.left_out,

@@ -51,7 +51,7 @@ class Horizon(Displayed):
         else:
             means = f"doubles are meaningful to t = {self.time:.4g} s of {self.t_end:g} s"
         return (
-            f"{means}: off by {self.worst:.2g} of the motion's scale at most "
+            f"{means}: a relative error of {self.worst:.2g} at most "
             f"({METHOD} at rtol {SMALLEST_RTOL:g}, against {self.origin}, "
             f"itself accurate to {self.sure:.1g})"
         )
@@ -67,7 +67,7 @@ def horizon(
     seconds: float = 60.0,
     progress: Progress = lambda _: None,
 ) -> Horizon:
-    """Compare the scene's own run, at the tightest tolerance, with extended precision.
+    """Compare the scene's run, at the tightest tolerance, with extended precision.
 
     wanted   how the scene is to be run
     seconds  processor time for the run in extended precision, and for each run in doubles

@@ -1,4 +1,4 @@
-"""States sampled from a scene's own run."""
+"""States sampled from a scene's run."""
 
 from dataclasses import dataclass, replace
 

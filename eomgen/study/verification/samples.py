@@ -16,7 +16,7 @@ from eomgen.study.verification.sampled import sampled
 from eomgen.study.verification.states import random_state
 from eomgen.study.verification.truth import Exact, Truth
 
-SEEDED, OWN = "seeded", "own run"
+SEEDED, OWN = "seeded", "scene's run"
 CHECKED = 3
 """Number of states of each kind at which a second algorithm checks the 60 digits."""
 
@@ -47,7 +47,7 @@ def judging_states(
     seed: int,
     progress: Progress,
 ) -> tuple[list[Sample], list[Exact]]:
-    """`count` seeded states, about as many of the scene's own run, which is made as `wanted`, and v̇
+    """`count` seeded states, about as many of the scene's run, which is made as `wanted`, and v̇
     in 60 digits at each. States without a finite v̇ are left out.
 
     Raises `RunError` if the scene cannot start, or if no state of a kind has a finite v̇.

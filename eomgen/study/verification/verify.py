@@ -69,7 +69,7 @@ class Verified(Frozen, Displayed):
     """The results of the verification of a module.
 
     left_out  number of states without a finite acceleration in 60 digits
-    until     time up to which the scene's own run was followed, s
+    until     time up to which the scene's run was followed, s
     ulps      forward error of v̇ of each route at each state
     data      change of v̇ there by one ulp in the data, ulps
     stopped   how far an interrupt let it come; "" if it is complete
@@ -197,7 +197,7 @@ def _asked(
     seed: int,
     progress: Progress,
 ) -> tuple[list[State], SampledRun]:
-    """The seeded states, `count` of each kind, with those of the scene's own run; and that run."""
+    """The seeded states, `count` of each kind, with those of the scene's run; and that run."""
     if model.constraints:
         asked = constrained_states(model, module, count, seed, wanted.t_end)
     else:
@@ -264,7 +264,7 @@ def _modules(
 
 
 def _states(run: SampledRun, module: GeneratedModule, model: Model) -> list[State]:
-    """The states sampled from the scene's own run."""
+    """The states sampled from the scene's run."""
     unit = as_problem(module).unit  # within a step, quaternions are not of unit length
     inputs = dict.fromkeys(module.INPUTS, 0.0)
     return [
