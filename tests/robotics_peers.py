@@ -43,6 +43,7 @@ COMPARED = (
     "inverse_dynamics_derivatives",
     "operational_mobilities",
     "operational_inertias",
+    "inverse_mass_matrix",
     "forward_dynamics_derivatives",
 )
 
@@ -57,10 +58,12 @@ def differences(
     worst: dict[str, float] = {}
     for k, (q, v, basis) in enumerate(sampled):
         ours = {name: array[..., k] for name, array in found.items()}
-        for name, own, other, condition in robot.compared(q, v, basis, ours):
-            size = max(1e-3, float(np.abs(other).max(initial=0.0)))
-            off = float(np.abs(own - other).max(initial=0.0)) / size / max(1.0, condition / KNOWN)
-            worst[name] = max(worst.get(name, 0.0), off)
+        sizes, off = dict[str, float](), dict[str, float]()
+        for name, own, other, condition, *scale in robot.compared(q, v, basis, ours):
+            apart, size = (float(np.abs(x).max(initial=0.0)) for x in (own - other, other))
+            sizes[name] = max(sizes.get(name, 1e-3), size, *scale)
+            off[name] = max(off.get(name, 0.0), apart / max(1.0, condition / KNOWN))
+        worst = {n: max(worst.get(n, 0.0), off[n] / sizes[n]) for n in off}
     return len(robot.model.velocities), worst
 
 
@@ -140,8 +143,10 @@ class Robotics(Robot):
 
     def compared(
         self, q: Array, v: Array, basis: Array, ours: dict[str, Array]
-    ) -> Iterator[tuple[str, Array, Array, float]]:
-        """Each output, ours and Pinocchio's in our velocities, and the condition of M."""
+    ) -> Iterator[tuple[Any, ...]]:
+        """Each output, ours and Pinocchio's in our velocities, the condition of M, and the size of
+        its terms if they may cancel.
+        """
         model, data = self.pin, self.data
         vd, tau = self.vd[:, self.k], self.tau[:, self.k]
         self.k += 1
@@ -176,6 +181,7 @@ class Robotics(Robot):
         scaled = B / np.sqrt(np.diag(M))
         whole = scaled.T @ T.T @ mass @ T @ scaled
         W, condition = scaled @ np.linalg.solve(whole, scaled.T), float(np.linalg.cond(whole))
+        yield "inverse_mass_matrix", ours["inverse_mass_matrix"], W, condition
         yield from self._frames(v, rate @ own, T, ours, W, condition)
         if not self.constant:
             return
@@ -198,13 +204,10 @@ class Robotics(Robot):
         further = np.array([slope @ found + x for slope, x in slopes]).T.reshape(model.nv, nv)
         pushed = np.array([slope.T @ torque for slope, _ in slopes]).T.reshape(nv, nv)
         by_q = pushed + T.T @ (by_q @ T + by_v_pin @ turning + mass @ further)
-        expected = [-W @ by_q @ B, -W @ (T.T @ (by_v_pin @ T + mass @ sped)) @ B, W]
+        by_v = T.T @ (by_v_pin @ T + mass @ sped)
         name = "forward_dynamics_derivatives"
-        slopes_of_ours = ours[name]
-        for own_part, other in zip(
-            (slopes_of_ours[0] @ B, slopes_of_ours[1] @ B, slopes_of_ours[2]), expected, strict=True
-        ):
-            yield name, own_part, other, condition
+        expected = np.array([-W @ by_q @ B, -W @ by_v @ B])
+        yield name, ours[name] @ B, expected, condition, float(np.abs(found).max(initial=0.0))
 
     def _rates(self, T: Array, own: Array) -> tuple[Array, list[tuple[Array, Array]]]:
         """Ṫ, and for each velocity the derivatives of T and of Ṫ v by a small motion along it, of
@@ -296,7 +299,7 @@ class Robotics(Robot):
                 if worse < 1e12:
                     inertia = np.linalg.inv(mobility)
                     name = "operational_inertias"
-                    yield name, ours[name][self.mobile.index(i)], inertia, max(condition, worse)
+                    yield name, ours[name][self.mobile.index(i)], inertia, condition * worse
 
 
 def _skew(a: Array) -> Array:

@@ -7,11 +7,16 @@ from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import LARGEST_JACOBIAN, OutputNodes, names_of_inputs
 from eomgen.dynamics.tree.composite import Entries, solved
 from eomgen.dynamics.tree.sensitivity import Sensitivity, sensitivity
+from eomgen.dynamics.tree.slopes import ForwardSlopes
 from eomgen.dynamics.tree.vectors import sub, zeros
 from eomgen.program.differentiate import jacobian, substituted, tangent
+from eomgen.program.program import Output, cost, finish
 from eomgen.program.tape import Node, Stage
 from eomgen.tables.outputs import DERIVATIVES
 from eomgen.tables.routes import ROUTES
+
+Columns = list[list[Node]]
+"""A matrix by its columns."""
 
 
 @dataclass
@@ -32,14 +37,19 @@ class Matrices:
 def matrices(record: Recording, *, with_jacobian: bool) -> Matrices:
     """The matrices of derivatives that the model asks for, and the Jacobian `with_jacobian`.
 
-    A matrix of more than `LARGEST_JACOBIAN` operations is computed along directions.
+    A matrix of more than `LARGEST_JACOBIAN` operations is computed along directions. Before that, a
+    Jacobian by the state is tried by the recursion for derivatives of accelerations.
     """
     found = Matrices()
     asked = [name for name in record.model.outputs if name in DERIVATIVES]
     for name in (*["jacobian"] * with_jacobian, *asked):
         by = _variables(record, name)
         before = len(record.tape.steps)
-        rows = _matrix(record, name) if _is_small(record, name) else None
+        rows = None
+        if _is_small(record, name):
+            rows = _matrix(record, name)
+        elif name == "jacobian" and not _differentiated(record) and _recursion_is_small(record):
+            rows = _by_recursion(record)
         steps = len(record.tape.steps) - before
         if rows is None or (_differentiated(record) and steps > LARGEST_JACOBIAN):
             rows, found.extra[name] = _along_direction(record, by)
@@ -72,6 +82,16 @@ def _is_small(record: Recording, name: str) -> bool:
     return max(operations, columns * len(record.rates)) <= LARGEST_JACOBIAN
 
 
+def _recursion_is_small(record: Recording) -> bool:
+    """The same of the recursion for derivatives of accelerations: each column takes all axes once,
+    and more those on the way to the root.
+    """
+    nv, space = len(record.v), record.model.dimensions == 3
+    own, each, carrier = (150, 12, 70) if space else (40, 7, 25)
+    operations = 2 * nv * (own + each * nv) + carrier * sum(record.model.carriers)
+    return operations <= LARGEST_JACOBIAN
+
+
 def _along_direction(
     record: Recording, by: Sequence[Node]
 ) -> tuple[list[list[Node]], tuple[str, ...]]:
@@ -100,7 +120,12 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     factors = d.factors
     applied = jacobian(d.applied_force, by)
     if name == "jacobian":
-        columns = _state_columns(record)
+        slopes, nv = _slopes(record, record.vd), range(len(record.v))
+        columns = _state_columns(
+            record,
+            [[slopes.by_position.get((i, j), zero) for i in nv] for j in nv],
+            [[slopes.by_velocity.get((i, j), zero) for i in nv] for j in nv],
+        )
     elif name == "parameter_jacobian":
         # Accelerations as inputs, so that the steps that compute them are not differentiated.
         inputs = record.velocity_inputs("vd")
@@ -135,27 +160,93 @@ def inverse_derivatives(
     return less(slopes.by_position, by_position), less(slopes.by_velocity, by_velocity)
 
 
-def forward_derivatives(
-    record: Recording, tau: Sequence[Node]
-) -> tuple[list[list[Node]], list[list[Node]], list[list[Node]]]:
+def forward_derivatives(record: Recording, tau: Sequence[Node]) -> tuple[Columns, Columns]:
     """The columns of the derivatives of accelerations under generalised forces `tau` beside the
-    effects: by position and velocity as in `inverse_derivatives`, and by `tau`.
+    effects, as in `inverse_derivatives`; by the recursion that takes fewer operations.
     """
-    found, tape = record.forward(tau), record.tape
+    found, nq = record.forward(tau), len(record.q)
     if _differentiated(record):
-        by = [*record.q, *record.v, *tau]
-        columns = list(zip(*jacobian(found, by), strict=True))
-        nq, nv = len(record.q), len(record.v)
-        along = _along_velocities(record, columns[:nq])
-        return along, [list(c) for c in columns[nq:][:nv]], [list(c) for c in columns[nq + nv :]]
-    zero, one = tape.constant(0.0), tape.constant(1.0)
-    rows, factors = range(len(record.v)), record.dynamics.factors
+        rows = jacobian(found, [*record.q, *record.v])
+        columns = [list(column) for column in zip(*rows, strict=True)]
+        return _along_velocities(record, columns[:nq]), columns[nq:]
+    ways = [_by_articulated_bodies(record, found)]
+    if _is_small(record, "jacobian"):
+        ways.append(_by_factors(record, found))
+    return min(ways, key=lambda way: _operations(record, *way))
+
+
+def inverse_mass_matrix(record: Recording) -> Columns:
+    """The columns of M⁻¹; with constraints of what keeps them. By fewer operations, too."""
+    zero, one = record.tape.constant(0.0), record.tape.constant(1.0)
+    nv, d = range(len(record.v)), record.dynamics
+    units = [[one if i == j else zero for i in nv] for j in nv]
+    if _differentiated(record):
+        return [d.response(record.route)(unit) for unit in units]
+    slopes = _forward_slopes(record, record.vd)
+    ways = [[slopes.by_force(j) for j in nv], [solved(d.factors, unit) for unit in units]]
+    lower = ([[c[min(i, j)][max(i, j)] for i in nv] for j in nv] for c in ways)
+    return min(lower, key=lambda way: _operations(record, way))
+
+
+def _by_articulated_bodies(record: Recording, vd: Sequence[Node]) -> tuple[Columns, Columns]:
+    """The columns of the derivatives of accelerations `vd` by their own recursion."""
+    by_position, by_velocity = _accelerating(record, vd)
+    of_forces = _applied_slopes(record)
+    return (
+        _with_forces(record, by_position, of_forces[0]),
+        _with_forces(record, by_velocity, of_forces[1]),
+    )
+
+
+def _with_forces(record: Recording, columns: Columns, forces: Columns) -> Columns:
+    """Columns of accelerations, with those by columns of generalised forces."""
+    found = []
+    for column, force in zip(columns, forces, strict=True):
+        if not all(map(record.scalars.is_zero, force)):
+            more = solved(record.dynamics.factors, force)
+            column = [x + y for x, y in zip(column, more, strict=True)]
+        found.append(column)
+    return found
+
+
+def _by_factors(record: Recording, vd: Sequence[Node]) -> tuple[Columns, Columns]:
+    """The same by derivatives of inverse dynamics and the factors of M."""
+    zero, factors = record.tape.constant(0.0), record.dynamics.factors
     by_position, by_velocity = (
         [solved(factors, [zero - x for x in column]) for column in columns]
-        for columns in inverse_derivatives(record, found)
+        for columns in inverse_derivatives(record, vd)
     )
-    units = ([one if i == j else zero for i in rows] for j in rows)
-    return by_position, by_velocity, [solved(factors, unit) for unit in units]
+    return by_position, by_velocity
+
+
+def _operations(record: Recording, *matrices: Columns) -> int:
+    """The operations of matrices."""
+    nodes = tuple(x.index for columns in matrices for column in columns for x in column)
+    program = finish(record.tape, {"": Output((len(nodes),), nodes)}, ())
+    return cost(program, "")["total"]
+
+
+def _accelerating(record: Recording, vd: Sequence[Node]) -> tuple[Columns, Columns]:
+    """The columns of the derivatives of accelerations without those of applied forces."""
+    slopes = _forward_slopes(record, vd)
+    pairs = [slopes.columns_by(j) for j in range(len(record.v))]
+    return [first for first, _ in pairs], [second for _, second in pairs]
+
+
+def _forward_slopes(record: Recording, vd: Sequence[Node]) -> ForwardSlopes:
+    d = record.dynamics
+    base, moving = sub(zeros(record.scalars), d.down), d.accelerating(vd)
+    nv = len(record.v)
+    return ForwardSlopes(d.kinematics, d.felt[1], moving, base, nv, record.scalars)
+
+
+def _by_recursion(record: Recording) -> list[list[Node]]:
+    """The Jacobian by the state, row by row, by the recursion for derivatives of accelerations."""
+    d, by = record.dynamics, record.state
+    columns = _state_columns(record, *_accelerating(record, record.vd))
+    forces = [list(column) for column in zip(*jacobian(d.applied_force, by), strict=True)]
+    middle = [list(row) for row in zip(*_with_forces(record, columns, forces), strict=True)]
+    return [*jacobian(record.position_rates, by), *middle, *jacobian(d.state_rates, by)]
 
 
 def _applied_slopes(record: Recording) -> tuple[list[list[Node]], list[list[Node]]]:
@@ -198,27 +289,23 @@ def _slopes(record: Recording, vd: Sequence[Node]) -> Sensitivity:
     return sensitivity(d.inertias_in_world, twists, accelerating, base, record.scalars)
 
 
-def _state_columns(record: Recording) -> list[list[Node]]:
-    """The columns of ∂τ/∂y at fixed accelerations, for a state y = [q, v, x].
-
-    `sensitivity` differentiates by a small rotation δ in body axes; for a quaternion q the chain
-    rule takes δ = (2/|q|²) Im(q* dq).
+def _state_columns(
+    record: Recording, by_position: Columns, by_velocity: Columns
+) -> list[list[Node]]:
+    """The columns of derivatives by a state y = [q, v, x], from those by small motions along the
+    velocities, of a spherical joint a small rotation δ in body axes, and by v. For a quaternion q
+    the chain rule takes δ = (2/|q|²) Im(q* dq).
     """
     model, tape = record.model, record.tape
-    slopes = _slopes(record, record.vd)
     nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
-
-    def column(entries: Entries, j: int) -> list[Node]:
-        return [entries.get((i, j), zero) for i in range(nv)]
-
     columns: list[list[Node]] = []
     for index in model.joint_indices:
-        columns += [column(slopes.by_position, j) for _, j in index.plain if j < nv]
+        columns += [by_position[j] for _, j in index.plain if j < nv]
         if not index.quaternion:
             continue
         w, x, y, z = (record.q[i] for i in index.quaternion)
         k = two / (w * w + x * x + y * y + z * z)
-        rotations = [column(slopes.by_position, j) for j in index.spin]
+        rotations = [by_position[j] for j in index.spin]
         for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
             weights = [k * sign for sign in signs]
             columns.append(
@@ -227,5 +314,5 @@ def _state_columns(record: Recording) -> list[list[Node]]:
                     for a, b, c in zip(*rotations, strict=True)
                 ]
             )
-    columns += [column(slopes.by_velocity, j) for j in range(nv)]
+    columns += by_velocity
     return columns + [[zero] * nv for _ in record.x]

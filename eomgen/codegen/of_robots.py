@@ -10,6 +10,7 @@ from itertools import chain
 
 from eomgen.base.errors import SceneError
 from eomgen.codegen.jacobians import forward_derivatives, inverse_derivatives
+from eomgen.codegen.jacobians import inverse_mass_matrix as inverse_mass_columns
 from eomgen.codegen.observed import frame_jacobian, of_points
 from eomgen.codegen.recording import Recording
 from eomgen.dynamics.regressor import InertialParameter, regressor
@@ -165,8 +166,13 @@ def inverse_dynamics_derivatives(record: Recording, vd: Sequence[Node]) -> list[
 
 
 def forward_dynamics_derivatives(record: Recording, tau: Sequence[Node]) -> list[Node]:
-    """∂v̇/∂q along the velocities, ∂v̇/∂v, and ∂v̇/∂τ = M⁻¹."""
+    """∂v̇/∂q along the velocities, and ∂v̇/∂v."""
     return _by_rows(*forward_derivatives(record, tau))
+
+
+def inverse_mass_matrix(record: Recording) -> list[Node]:
+    """M⁻¹, row by row."""
+    return _by_rows(inverse_mass_columns(record))
 
 
 def _by_rows(*matrices: Sequence[Sequence[Node]]) -> list[Node]:

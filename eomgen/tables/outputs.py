@@ -184,9 +184,14 @@ _OF_ROBOTS: Mapping[str, OutputSpec] = {
         "inverse_dynamics_derivatives",
         beside="vd",
     ),
+    "inverse_mass_matrix": _unusual(
+        ("nv", "nv"),
+        "M^-1; of what moves where constraints hold: accelerations by unit forces.",
+        "inverse_mass_matrix",
+    ),
     "forward_dynamics_derivatives": _unusual(
-        (3, "nv", "nv"),
-        "Derivatives of `forward_dynamics` by small motions along each velocity, by `v`, by `tau`.",
+        (2, "nv", "nv"),
+        "Derivatives of `forward_dynamics` by small motions along each velocity, and by `v`.",
         "forward_dynamics_derivatives",
         beside="tau",
     ),

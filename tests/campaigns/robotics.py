@@ -6,8 +6,9 @@ prints for each URDF of the package `example-robot-data` its freedoms and the la
 each output from Pinocchio's: Jacobians of frames in its three conventions and their rates times v,
 centre of mass, momentum about it, operational space, gravity, the Coriolis matrix, the regressor,
 derivatives of dynamics. Friction and damping, which Pinocchio does not apply, are taken out.
-Differences are relative to the largest entry; those of what has M⁻¹ are divided by what 1e-10 of
-`tests/campaigns/robots.py` leaves: where the condition of M is more than 1e6, by its part in that.
+Differences are relative to the largest entry; those of what has M⁻¹ are divided by the condition of
+M in millions, if it is more than one; for `operational_inertias`, which are inverted once more, by
+the product with the condition of that matrix. All are scaled to a diagonal of 1.
 """
 
 import argparse

@@ -59,7 +59,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """What one axis j does: S, ψ', ψ'' and ψ' + S'."""
 
     axis: Twist
@@ -85,7 +85,7 @@ def sensitivity(
     forces = carried(kinematics, inertial(kinematics, accelerating, scalars))
     drags = _composite_drags(kinematics, twists, scalars)
     columns = [
-        _columns(kinematics, k, twists, accelerating, base, scalars) for k in range(len(links))
+        columns_of(kinematics, k, twists, accelerating, base, scalars) for k in range(len(links))
     ]
     by_q: dict[tuple[int, int], Scalar] = {}
     by_v: dict[tuple[int, int], Scalar] = {}
@@ -95,7 +95,7 @@ def sensitivity(
             reach = force_to_move(bodies[k], own.axis.angular, own.axis.linear)
             pull = drag.transposed_times(own.axis)
             rotated = total(
-                _rotated(own.axis, forces[k]),
+                turned_force(own.axis, forces[k]),
                 total(_moved(bodies[k], own.second), drag.times(own.first)),
             )
             sped = total(_moved(bodies[k], own.both), drag.times(own.axis))
@@ -155,24 +155,27 @@ def coriolis(kinematics: TreeKinematics, twists: Sequence[Twist], scalars: Scala
     return entries
 
 
-def _columns(
+def columns_of(
     kinematics: TreeKinematics,
     k: int,
     twists: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
-) -> list[_Column]:
+) -> list[Column]:
     link = kinematics.links[k]
     nothing = zeros(scalars)
-    carrier, pushed = Twist(nothing, nothing), Twist(nothing, base)
+    carrier, pushed = Twist(nothing, nothing), Twist(nothing, link.rotation.into(base))
     if link.parent >= 0:
         v, a = twists[link.parent], accelerating[link.parent]
         linear = add(v.linear, cross(v.angular, link.arm))
-        carrier = Twist(v.angular, linear)
+        carrier = Twist(link.rotation.into(v.angular), link.rotation.into(linear))
         # The spatial acceleration, of a point fixed in space (Featherstone 2008, 2.11).
         reached = add(a.linear, times(a.field, link.arm))
-        pushed = Twist(a.angular, sub(reached, cross(v.angular, linear)))
+        pushed = Twist(
+            link.rotation.into(a.angular),
+            link.rotation.into(sub(reached, cross(v.angular, linear))),
+        )
     own = Twist(twists[k].angular, twists[k].linear)
     columns = []
     for axis, _ in link.free:
@@ -181,7 +184,7 @@ def _columns(
         second = _plus(_crossed(pushed, s), _crossed(carrier, first))
         # v x S = v_p x S for a single axis.
         rate = first if len(link.axes) == 1 else _crossed(own, s)
-        columns.append(_Column(s, first, second, _plus(first, rate)))
+        columns.append(Column(s, first, second, _plus(first, rate)))
     return columns
 
 
@@ -210,9 +213,7 @@ def _composite_drags(
     two = scalars.number(2.0)
     found = []
     for link, motion in zip(kinematics.links, twists, strict=True):
-        _, p = momentum_of(link, motion)
-        field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
-        matrix = plus(_outer(link.rigid.first_moment, motion.linear), _negated(field))
+        p, matrix = drag_of(link, motion, scalars)
         found.append(_Drag(p, matrix, two))
     for k in reversed(range(len(found))):
         link = kinematics.links[k]
@@ -223,6 +224,13 @@ def _composite_drags(
                 add(outer.momentum, inner.momentum), plus(outer.matrix, moved), two
             )
     return found
+
+
+def drag_of(link: Link, motion: Twist, scalars: Scalars) -> tuple[Vec, Mat]:
+    """The momentum p of a link's own mass, and its matrix A."""
+    _, p = momentum_of(link, motion)
+    field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
+    return p, plus(_outer(link.rigid.first_moment, motion.linear), _negated(field))
 
 
 def _second_moment(link: Link, scalars: Scalars) -> Mat:
@@ -259,7 +267,7 @@ def _crossed(a: Twist, b: Twist) -> Twist:
     )
 
 
-def _rotated(s: Twist, f: Wrench) -> Wrench:
+def turned_force(s: Twist, f: Wrench) -> Wrench:
     """s x* f of a motion and a force."""
     return Wrench(
         add(cross(s.angular, f.moment), cross(s.linear, f.force)), cross(s.angular, f.force)
