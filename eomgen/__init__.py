@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from eomgen.api.given import check, read
     from eomgen.api.importing import import_robot
     from eomgen.api.linearising import linearise
+    from eomgen.api.reaching import kinematics
     from eomgen.api.reopening import load_run
     from eomgen.api.runs import Run
     from eomgen.api.simulating import simulate
@@ -69,6 +70,7 @@ __all__ = [
     "grid",
     "horizon",
     "import_robot",
+    "kinematics",
     "linearise",
     "load",
     "load_run",
@@ -95,6 +97,7 @@ _PLACES = {
     "Fit": "results.fitted",
     "gallery": "api.exhibiting",
     "import_robot": "api.importing",
+    "kinematics": "api.reaching",
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",
