@@ -27,8 +27,8 @@ FRAMES = {
 }
 ORDER = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """Pinocchio's order of inertial parameters."""
-KNOWN = 1e6
-"""The condition of M up to which 1e-10 is asked of what has M⁻¹."""
+KNOWN = 1e-10 / 2.0**-52
+"""The condition of M up to which 1e-10 is asked of what has M⁻¹; beyond it that times 2⁻⁵²."""
 COMPARED = (
     *(f"frame_jacobians{end}" for end in FRAMES),
     *(f"frame_bias_accelerations{end}" for end in FRAMES),

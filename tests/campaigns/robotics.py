@@ -6,9 +6,10 @@ prints for each URDF of the package `example-robot-data` its freedoms and the la
 each output from Pinocchio's: Jacobians of frames in its three conventions and their rates times v,
 centre of mass, momentum about it, operational space, gravity, the Coriolis matrix, the regressor,
 derivatives of dynamics. Friction and damping, which Pinocchio does not apply, are taken out.
-Differences are relative to the largest entry; those of what has M⁻¹ are divided by the condition of
-M in millions, if it is more than one; for `operational_inertias`, which are inverted once more, by
-the product with the condition of that matrix. All are scaled to a diagonal of 1.
+Differences are relative to the largest entry. As in `robots.py` 1e-10 is asked, of what has M⁻¹
+2⁻⁵² times the condition of M if that is more: such differences are divided by what it is above. For
+`operational_inertias`, which are inverted once more, it is the product with the condition of these.
+Matrices are scaled to a diagonal of 1.
 """
 
 import argparse

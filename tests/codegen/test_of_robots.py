@@ -1,6 +1,7 @@
 """Outputs for robotics: beside Pinocchio for a robot file; beside one another for other scenes."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,16 @@ from numpy.testing import assert_allclose
 from robot_files import joint, link, written
 
 import eomgen
+from eomgen.api.given import check
+from eomgen.codegen import jacobians
+from eomgen.codegen.jacobians import matrices
+from eomgen.codegen.recording import Recording
+from eomgen.program.program import Output, finish, interpret
+from eomgen.program.tape import TIME
+from eomgen.scalars.floats import FloatScalars
 from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
-UNUSUAL = tuple(name for name, spec in OUTPUTS.items() if not spec.usual)
+UNUSUAL = tuple(n for n, spec in OUTPUTS.items() if spec.builder.startswith("of_robots:"))
 BESIDE = (
     *("forward_dynamics", "mass_matrix", "velocity_force", "bias_force", "momentum"),
     *("centre_of_mass", "point_velocities", "point_jacobians"),
@@ -72,6 +80,18 @@ at_2 = {2}
 stiffness = 7.0
 damping = 0.4
 rest_length = 0.1
+"""
+CHAIN = """
+name = "chain"
+dimensions = 3
+[[chains]]
+name = "link"
+count = 8
+mass = 1.0
+inertia_com = [0.1, 0.2, 0.3]
+r_parent = [0.1, 0.2, 0.3]
+r_child = [-0.1, -0.2, -0.3]
+axis = [1.0, 2.0, 3.0]
 """
 PLANAR = (2, "0.3", "[0.2, 0.1]", "[-0.3, 0.2]", "", "revolute")
 IN_SPACE = (
@@ -240,3 +260,39 @@ def test_names_in_the_docs_exist() -> None:
     names = {name for cell in rows for name in re.findall(r"`(\w+)`", cell)}
     assert names >= {*UNUSUAL}
     assert not [n for n in names if n not in (*OUTPUTS, "jacobian") and not hasattr(eomgen, n)]
+
+
+@pytest.mark.parametrize("space", [PLANAR, IN_SPACE], ids=["plane", "space"])
+def test_a_jacobian_by_the_recursion_is_the_same(
+    space: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by inverse dynamics and the factors of M, with quaternions and effects; not along
+    directions.
+    """
+    model = check(TREE.format(*space))
+    by_factors = matrices(Recording(model, "aba"), with_jacobian=True)
+    monkeypatch.setattr(jacobians, "_is_small", lambda record, name: False)
+    by_recursion = matrices(Recording(model, "aba"), with_jacobian=True)
+    assert not by_recursion.tangents
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    values = np.random.default_rng(2).normal(size=len(names))
+    given = {**model.defaults, TIME: 0.0, **dict(zip(names, values, strict=True))}
+    found = []
+    for made in (by_factors, by_recursion):
+        shape, nodes = made.nodes["jacobian"]
+        output = Output(shape, tuple(node.index for node in nodes))
+        program = finish(nodes[0].tape, {"jacobian": output}, ())
+        found.append(interpret(program, "jacobian", given, FloatScalars()))
+    assert_allclose(*found, atol=1e-11)
+
+
+def test_the_recursion_of_fewer_operations_is_taken() -> None:
+    """Articulated bodies for a chain in space, whatever is cheaper for a tree in the plane."""
+    for text in (CHAIN, TREE.format(*PLANAR)):
+        record = Recording(replace(check(text), outputs=()), "aba")
+        ways = (jacobians._by_articulated_bodies, jacobians._by_factors)
+        costs = [jacobians._operations(record, *way(record, record.vd)) for way in ways]
+        still = [record.tape.constant(0.0)] * len(record.v)
+        taken = jacobians.forward_derivatives(record, still)
+        assert jacobians._operations(record, *taken) == min(costs)
+        assert text != CHAIN or costs[0] < 0.9 * costs[1]
