@@ -91,6 +91,8 @@ TABLES: dict[str, dict[str, str]] = {
     "sampled_controller": {"period": "0.1", "inputs": '{{ wish = "z" }}', "seed": "1",
                            "torques": '{{ hinge = "z" }}', "states": '{{ z = {{ next = "s" }} }}',
                            "sensors": '{{ s = {{ value = "swing", noise = 1, quantum = 1 }} }}'},
+    "tether": {"length": "9", "restitution": "1",
+               "through": '[{{ body = "world", at = {v} }}, {{ body = "trolley" }}]'},
 }  # fmt: skip
 """Of every effect good tables, which together give every field that holds a quantity or a name."""
 OF_ANY_SIGN = set(
@@ -100,7 +102,7 @@ OF_ANY_SIGN = set(
     "joint_spring.law joint_spring.rest joint_stop.high joint_stop.low joint_stop.restitution "
     "motor.torque pairwise.law pd.target pd.target_rate pid.target pid.target_rate "
     "point_gravity.at sampled_controller.inputs sampled_controller.torques spring.at_1 "
-    "spring.at_2 spring.law spring.rest_length".split()
+    "spring.at_2 spring.law spring.rest_length tether.restitution".split()
 )
 """Forces, places, laws and targets; a restitution has two bounds, and tests of its own. All else,
 stiffness, damping, drag, gains, is not negative.
@@ -230,6 +232,8 @@ def test_names_and_vectors(kind: str) -> None:
     member = MEMBERS[kind.split()[0]]
     for field in (*member.body_fields, *member.anchor_fields):
         if field not in TABLES[kind] or TABLES[kind][field] == '"all"':
+            continue
+        if TABLES[kind][field].startswith("["):  # tables, whose mistakes are with their own tests
             continue
         place = f"effects[0].{field}"
         if TABLES[kind][field].startswith("{"):
