@@ -167,10 +167,11 @@ def test_the_errors_of_numpy_are_settings_of_ours() -> None:
         (ROD.replace("revolute", "hinge"), "unknown value 'hinge' (did you mean 'revolute'?)"),
         (ROD.replace("revolute", "pin"), "unknown value 'pin' (did you mean 'revolute'?)"),
         (ROD.replace('"world"', '"ground"'), "named 'ground' (did you mean 'world'?)"),
-        (ROD.replace("revolute", "gear"), "[[constraints]] with type = 'coupling'"),
-        (ROD.replace('"gravity"', '"rope"'), "'rope' (did you mean 'spring'?)"),
-        (ROD.replace("effects", "constraints").replace('"gravity"', '"rope"'),
-         "[[effects]] with type = 'spring' and tension_only = true, or a coupling"),
+        (ROD.replace("revolute", "gear"), "; that is a table [[constraints]] with type = 'gear'"),
+        (ROD.replace('"gravity"', '"rope"'),
+         "; that is a table [[constraints]] with type = 'rope', or a tether"),
+        (ROD.replace("effects", "constraints").replace('"gravity"', '"string"'),
+         "[[effects]] with type = 'tether', or a rope if it is always taut"),
     ],
 )  # fmt: skip
 def test_words(text: str, why: str) -> None:

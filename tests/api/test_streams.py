@@ -42,6 +42,7 @@ COMMANDS = {
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
     "fit": f"fit pendulum {TESTS / 'swing.csv'} --names gravity_g",
+    "certify": "certify pendulum --t-end 0.1",
     "linearise": "linearise cart_pole",
     "plot": "plot pendulum --of theta,energy --t-end 0.1 -o {out}/p.pdf",
     "film": "film pendulum --t-end 0.1 -o {out}/f.gif",

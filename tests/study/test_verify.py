@@ -445,7 +445,9 @@ def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.Mon
     module = load_module(python_module(compile_program(model).system))
     whole = horizon_of(model, wanted, module)
     assert whole.time is None and 1e-16 < whole.worst < 1e-10 and whole.sure < 1e-15
-    assert whole.words.startswith("doubles are meaningful for the whole run, 0.8 s: off by")
+    assert whole.words.startswith(
+        "doubles are meaningful for the whole run, 0.8 s: a relative error of"
+    )
     monkeypatch.setattr(horizons, "PARTED", whole.worst / 2)
     part = horizon_of(model, wanted, module)
     assert part.time is not None and 0.1 < part.time <= 0.8

@@ -107,6 +107,10 @@ def of_studies() -> None:
     print(eomgen.arithmetic("pendulum", states=2))
     print(eomgen.accuracy("pendulum", quick=True, t_end=0.2, methods=["rk4"], time=2.0))
     print(eomgen.effects("pendulum", motion=None))
+    proof: eomgen.Enclosure = eomgen.certify("pendulum", t_end=0.1, samples=3)
+    print(proof.largest, proof.finished)
+    pole = eomgen.kinematics("cart_pole")
+    print(pole.reach({pole.points[0]: [0.3, 0.2]}, starts=2).converged)
 
 
 def of_others(robot: Path) -> None:
