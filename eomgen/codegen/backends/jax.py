@@ -38,8 +38,8 @@ BLOCK = 128
 WIDTH = 100
 BESIDE = {"tau": ("tau=None", "jnp.zeros_like(v) if tau is None else tau"), "vd": ("vd", "vd")}
 """The arguments beside the state, and what each is."""
-LEFT_OUT = ("impact", "held", "implicit_step", "project_position", "project_velocity")
-"""Outputs for simulations with contacts or loops, which take other arguments."""
+LEFT_OUT = ("impact", "held", "implicit_step", "project_position", "project_velocity", "samples")
+"""Outputs for simulations with contacts, loops or samples, which take other arguments."""
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:

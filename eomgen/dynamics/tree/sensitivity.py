@@ -163,6 +163,7 @@ def columns_of(
     base: Vec,
     scalars: Scalars,
 ) -> list[Column]:
+    """What each free axis of the joint of link k does, in the axes of `kinematics`."""
     link = kinematics.links[k]
     nothing = zeros(scalars)
     carrier, pushed = Twist(nothing, nothing), Twist(nothing, link.rotation.into(base))
