@@ -108,7 +108,8 @@ def svg(drawing: Drawing) -> str:
     parts = [_svg_item(item, h) for item in drawing.items]
     inner = "\n".join(parts)
     return (
-        f'<svg viewBox="0 0 {w:g} {h:g}" width="{w:g}" height="{h:g}" role="img">'
+        f'<svg viewBox="0 0 {w:g} {h:g}" width="{w:g}" height="{h:g}" role="img" '
+        f'font-size="13" font-family="serif">'
         f"<title>{escape(drawing.title)}</title>\n{inner}\n</svg>"
     )
 

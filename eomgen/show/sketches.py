@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from eomgen.derivation.effects import DerivedEffect
@@ -21,7 +22,7 @@ from eomgen.model.named import Values
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
-from eomgen.show.labels import with_clear_labels
+from eomgen.show.labels import stroke_points, with_clear_labels
 from eomgen.show.symbols import BASE, numbers_of
 
 Expr = Any
@@ -32,6 +33,8 @@ GROUND = 12.0
 """How far below its joint the ground is."""
 MOST_NAMED = 6
 """The most bodies of a sketch whose arms are named."""
+SHARED = 14.0
+"""Ends of axes as near as this have one letter."""
 
 
 @dataclass(frozen=True)
@@ -161,8 +164,11 @@ def mechanism_sketch(model: Model, effects: Sequence[DerivedEffect]) -> Drawing:
     for shape in shapes:
         items += _arms(shape, fit.at, taken if few else None, names)
     for shape in shapes:
-        items += _marks(shape, fit.at, model, few)
-    items += _world_axes(pose)
+        items += _marks(shape, fit.at, model)
+    if few:
+        items += _body_axes(shapes, fit.at)
+        items += (Label(_beside_centre(fit.at(x.centre)), x.body.name, "axis") for x in shapes)
+    items += _world_axes(pose, _free_corner(items, model.dimensions))
     title = f"{model.title}: the mechanism at its initial pose"
     return with_clear_labels(Drawing(WIDE, HIGH, title, tuple(items)))
 
@@ -248,19 +254,9 @@ def _angle(pose: Pose, shapes: Sequence[Shape], shape: Shape, at: Any) -> Iterat
     yield Label(label, sp.Symbol(name), "angle")
 
 
-def _marks(shape: Shape, at: Any, model: Model, few: bool) -> Iterator[Item]:
-    centre = at(shape.centre)
-    if few:
-        for letter, axis in zip("xyz", shape.axes, strict=False):
-            length = math.hypot(*axis)
-            if length > 0.15:
-                end = (centre[0] + 24 * axis[0], centre[1] + 24 * axis[1])
-                yield Line((centre, end), "axis", arrow=True)
-                tip = (centre[0] + 34 * axis[0], centre[1] + 34 * axis[1])
-                yield Label(tip, sp.Symbol(letter), "axis")
-    yield Dot(centre, 3.2, True)
-    if few:
-        yield Label((centre[0] - 11, centre[1] - 12), shape.body.name, "axis")
+def _marks(shape: Shape, at: Any, model: Model) -> Iterator[Item]:
+    """Its centre of mass, its own joint with what holds it, and its pins."""
+    yield Dot(at(shape.centre), 3.2, True)
     if shape.own is not None and is_held(model, shape.body):
         own = at(shape.own)
         if shape.body.parent < 0:
@@ -270,6 +266,26 @@ def _marks(shape: Shape, at: Any, model: Model, few: bool) -> Iterator[Item]:
         yield Dot(at(pin), 4.2, False, "arm")
 
 
+def _beside_centre(p: Point) -> Point:
+    """Where the name of a body is looked for first."""
+    return (p[0] - 11, p[1] - 12)
+
+
+def _body_axes(shapes: Sequence[Shape], at: Any) -> Iterator[Item]:
+    """The axes of bodies; of ends that are near each other only one has the letter."""
+    named: list[tuple[str, Point]] = []
+    for shape in shapes:
+        x, y = at(shape.centre)
+        for letter, axis in zip("xyz", shape.axes, strict=False):
+            if math.hypot(*axis) <= 0.15:
+                continue
+            yield Line(((x, y), (x + 24 * axis[0], y + 24 * axis[1])), "axis", arrow=True)
+            tip = (x + 34 * axis[0], y + 34 * axis[1])
+            if all(other != letter or apart(tip, p) > SHARED for other, p in named):
+                named.append((letter, tip))
+                yield Label(tip, sp.Symbol(letter), "axis")
+
+
 def _ground(p: Point) -> Iterator[Item]:
     """What holds a joint on the world."""
     for line in BASE:
@@ -277,11 +293,17 @@ def _ground(p: Point) -> Iterator[Item]:
         yield Line(tuple((p[0] + GROUND * y, p[1] - GROUND * x) for x, y in down), "axis")
 
 
-def _world_axes(pose: Pose) -> Iterator[Item]:
-    n = pose.model.dimensions
-    corner = (30.0, 26.0) if n == 2 else (40.0, 34.0)
-    for i in range(n):
-        unit = pose.flat(tuple(float(i == j) for j in range(n)))
+def _free_corner(items: Iterable[Item], dimensions: int) -> Point:
+    """Where the world's axes start: in the corner in which least is drawn, first the lower left."""
+    drawn = stroke_points(items)[:, :2]
+    aside, up = (30.0, 26.0) if dimensions == 2 else (40.0, 34.0)
+    corners = [(x, y) for y in (up, HIGH - up - 26) for x in (aside, WIDE - aside - 26)]
+    return min(corners, key=lambda p: int((np.abs(drawn - p - 12).max(axis=1) < 44).sum()))
+
+
+def _world_axes(pose: Pose, corner: Point) -> Iterator[Item]:
+    for i in range(pose.model.dimensions):
+        unit = pose.flat(tuple(float(i == j) for j in range(pose.model.dimensions)))
         end = (corner[0] + 26 * unit[0], corner[1] + 26 * unit[1])
         yield Line((corner, end), "axis", arrow=True)
         tip = (corner[0] + 37 * unit[0], corner[1] + 37 * unit[1])
