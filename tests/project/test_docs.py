@@ -8,6 +8,7 @@ import subprocess
 import tomllib
 import warnings
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -43,6 +44,7 @@ SHORT = [DOCS / "howto" / "lecture.md", DOCS / "howto" / "scene.md"]
 """Pages that have all there is in others: files, commands, what they print, and Python."""
 FILE = re.compile(r"^(?:#|/\*|<!--) (append to )?(\S+\.\w+)\b.*\n")
 """The first line of a block that is a file, or the end of one."""
+CONTINUED = "The blocks of Python continue each other"
 
 
 def blocks(text: str) -> list[tuple[str, str]]:
@@ -57,11 +59,13 @@ def test_a_page_does_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every page in a full run, as in `.ci/run`. Files are written, commands run, and Python prints
-    what it says. Every line of a text block is printed by the commands before it, in order.
+    what it says; a block has the names of those before it where the page says so. Every line of a
+    text block is printed by the commands before it, in order.
     """
     monkeypatch.chdir(tmp_path)
-    printed = ""
-    for language, content in blocks(page.read_text("utf-8")):
+    printed, text = "", page.read_text("utf-8")
+    names: dict[str, Any] = {}
+    for language, content in blocks(text):
         if named := FILE.match(content):
             path, rest = tmp_path / named[2], content[named.end() :]
             before = path.read_text("utf-8") + "\n" if named[1] else ""
@@ -69,7 +73,8 @@ def test_a_page_does_what_it_says(
         elif language == "sh":
             printed = "".join(command(line) for line in content.splitlines())
         elif language == "python":
-            assert python(content) == re.findall(r"# prints (.*)", content), content
+            names = names if CONTINUED in text else {}
+            assert python(content, names) == re.findall(r"# prints (.*)", content), content
         elif language == "text":
             at = 0
             for line in filter(str.strip, content.splitlines()):
@@ -91,9 +96,9 @@ def command(line: str) -> str:
     return output.getvalue()
 
 
-def python(content: str) -> list[str]:
-    """Run an example with names of its own; return the lines that it prints. A process of its own
-    would take a second to import what is loaded here.
+def python(content: str, names: dict[str, Any]) -> list[str]:
+    """Run an example, which adds to the names; return the lines that it prints. A process of its
+    own would take a second to import what is loaded here.
     """
     output = io.StringIO()
     with (
@@ -101,7 +106,8 @@ def python(content: str) -> list[str]:
         warnings.catch_warnings(action="ignore"),
         patch("eomgen.show.figure.draw_motion", DRAWN),
     ):
-        exec(compile(content, "<example>", "exec"), {"__name__": "__main__"})
+        names["__name__"] = "__main__"
+        exec(compile(content, "<example>", "exec"), names)
     return output.getvalue().splitlines()
 
 
