@@ -345,8 +345,12 @@ const makePlots = (container, channels, { onSeek = () => {}, onPut = null, name 
   function vectorsOf(plot) {
     const colors = { ink: "--ink", faint: "--faint", rule: "--rule", paper: "--card" };
     const looks = Object.fromEntries(Object.entries(colors).map(([key, name]) => [key, paint(`var(${name})`)]));
-    const curves = plot.spec.y.map((key) =>
-      ({ label: channels.get(key).label, color: paint(colorName(plot, key)), dash: dashOf(plot, key) }));
+    const curves = plot.spec.y.map((key) => ({
+      label: channels.get(key).label,
+      color: paint(colorName(plot, key)),
+      dash: dashOf(plot, key),
+      series: 1 + plot.chart.keys.indexOf(key),
+    }));
     return vectors.plot(plot.chart.plot(), curves, { ...looks, corners: plot.chart.corners(), title: name });
   }
 

@@ -6,13 +6,14 @@
 //   kin     indices of the entries of the result of the same kind: their size shows what is rounding
 //   change  whether the value at the start of the run is subtracted
 //   color   a CSS colour, if it has one of its own
+//   beneath  whether its curve is below the others and wider: a total, which a part may equal
 
 const makeChannels = (data, mechanism) => {
   const space = data.dimensions === 3;
   const axes = space ? ["x", "y", "z"] : ["x", "y"];
   const list = [];
   const add = (key, label, group, unit, family, of, kin, more = {}) =>
-    list.push({ key, label, group, unit, family, of, kin, change: false, color: null, ...more });
+    list.push({ key, label, group, unit, family, of, kin, change: false, color: null, beneath: false, ...more });
   const has = (name) => typeof mechanism?.[name] === "function";
   const range = (count) => [...Array(count).keys()];
   const entry = (k) => (values) => values[k];
@@ -32,7 +33,7 @@ const makeChannels = (data, mechanism) => {
       add(key, label, "Energy", "J", "energies", of, [0, 1], { color: `var(--${color})`, ...more });
     put("kinetic_energy", "kinetic energy", entry(0), "kinetic");
     put("potential_energy", "potential energy", entry(1), "potential");
-    put("energy", "total energy", total, "total");
+    put("energy", "total energy", total, "total", { beneath: true });
     put("energy_change", "change of total energy", total, "accent", { change: true });
   }
 

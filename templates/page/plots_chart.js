@@ -7,7 +7,8 @@
 //   color(key), dash(key), paint(css)   colours as the page's theme has them
 //   view()   [from, to] of the time shown      mark()   time of the picture, s
 //   hover(time or null), seek(time), look([from, to] or null), step(n), end(direction)
-// Both return {refresh(), mark(), hover(time), resize(), canvas(), destroy()}.
+// Both return {keys, refresh(), mark(), hover(time), resize(), canvas(), destroy()}; `keys` are those of
+// the curves in the order in which they are drawn.
 
 const charts = (() => {
   const GAP = 0.06; // free part of a range beyond its curves
@@ -17,6 +18,7 @@ const charts = (() => {
   const FONT = '12px system-ui, "Segoe UI", Roboto, "Liberation Sans", sans-serif';
   const FAINT = 0.4; // of the curves of another run
   const NUDGE = 0.02; // part of the range by which keys move a state
+  const BENEATH = 4.4; // width of a curve below the others
   const HEIGHT = { time: 168, phase: 260 };
 
   // Limits of an axis for values from `low` to `high`.
@@ -40,6 +42,13 @@ const charts = (() => {
   // uPlot leaves a gap where there is no value, but joins over nan.
   const withGaps = (values) =>
     (values.every(Number.isFinite) ? values : Array.from(values, (value) => (Number.isFinite(value) ? value : null)));
+
+  // What is drawn, in its order.
+  const inOrder = ({ spec, channel }) => {
+    const [below, above] = [true, false].map((is) => spec.y.filter((key) => channel(key).beneath === is));
+    return { ...spec, y: [...below, ...above] };
+  };
+  const widthOf = (place, key, width) => (place.channel(key).beneath ? BENEATH : width);
 
   const scaleOf = (place, keys) => Math.min(...keys.map((key) => place.samples.scale(key)));
 
@@ -109,8 +118,9 @@ const charts = (() => {
   // ---- Against time ----
 
   function time(place) {
-    const { samples, spec, box } = place;
-    const units = [...new Set(spec.y.map((key) => place.channel(key).unit))];
+    const { samples, box } = place;
+    const spec = inOrder(place);
+    const units = [...new Set(place.spec.y.map((key) => place.channel(key).unit))];
     const scaleName = (key) => `y${units.indexOf(place.channel(key).unit)}`;
     const exponents = {};
     const all = place.kept ? [...spec.y, ...spec.y] : spec.y;
@@ -131,7 +141,7 @@ const charts = (() => {
         scale: scaleName(key),
         stroke: () => place.color(key),
         dash: place.dash(key),
-        width: 1.6,
+        width: widthOf(place, key, 1.6),
         alpha: k < spec.y.length ? 1 : FAINT,
         points: { show: false },
       }))],
@@ -163,6 +173,7 @@ const charts = (() => {
     };
     chart = {
       ...common(u, box, "time"),
+      keys: spec.y,
       refresh() {
         const times = samples.times();
         const other = place.kept?.columnsAt(spec.y, times) ?? [];
@@ -205,7 +216,8 @@ const charts = (() => {
   // ---- One channel against another ----
 
   function phase(place) {
-    const { samples, spec, box } = place;
+    const { samples, box } = place;
+    const spec = inOrder(place);
     const exponents = {};
     let chart = null;
     let [xs, ys] = [[], []];
@@ -260,7 +272,7 @@ const charts = (() => {
         facets: [{ scale: "x", auto: true }, { scale: "y0", auto: true }],
         stroke: () => place.color(key),
         dash: place.dash(key),
-        width: 1.4,
+        width: widthOf(place, key, 1.4),
         alpha: k < spec.y.length ? 1 : FAINT,
         paths: path,
       }))],
@@ -315,6 +327,7 @@ const charts = (() => {
 
     chart = {
       ...common(u, box, "phase"),
+      keys: spec.y,
       refresh() {
         current();
         if (place.kept) [keptX, ...keptY] = place.kept.columns([spec.x, ...spec.y]);

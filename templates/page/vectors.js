@@ -116,7 +116,8 @@ const vectors = (() => {
 
   // ---- Plots ----
 
-  // A plot of uPlot. `curves` are {label, color, dash}, in the order of its series; `corners` are texts above the axes.
+  // A plot of uPlot. `curves` are {label, color, dash, series}, with the number of the series that is drawn; `corners` are
+  // texts above the axes.
   function plot(u, curves, { ink, faint, rule, paper, corners, title }) {
     const ratio = uPlot.pxRatio;
     const [left, top, across, down] = ["left", "top", "width", "height"].map((key) => u.bbox[key] / ratio);
@@ -148,9 +149,9 @@ const vectors = (() => {
     corners.forEach((corner, i) => write(i ? u.width - 4 : 4, 12, corner, i ? "end" : "start"));
     // What lies within the axes is a picture of its own, which ends at them.
     parts.push(`<svg x="${left}" y="${top}" width="${across}" height="${down}" viewBox="${left} ${top} ${across} ${down}">`);
-    curves.forEach(({ color, dash }, k) => {
-      const [xs, ys] = u.mode === 2 ? u.data[k + 1] : [u.data[0], u.data[k + 1]];
-      const scale = u.mode === 2 ? "y0" : u.series[k + 1].scale;
+    for (const { color, dash, series } of [...curves].sort((a, b) => a.series - b.series)) {
+      const [xs, ys] = u.mode === 2 ? u.data[series] : [u.data[0], u.data[series]];
+      const scale = u.mode === 2 ? "y0" : u.series[series].scale;
       let [path, open] = ["", false];
       for (let i = 0; i < xs.length; i += 1) {
         const at = [left + u.valToPos(xs[i], "x"), top + u.valToPos(ys[i] ?? NaN, scale)];
@@ -158,8 +159,8 @@ const vectors = (() => {
         if (sound) path += `${open ? "L" : "M"}${place(at)}`;
         open = sound;
       }
-      parts.push(`<path d="${path || "M0,0"}" fill="none" stroke="${color}" stroke-width="1.6" stroke-linejoin="round" stroke-dasharray="${dash.join(" ") || "none"}"/>`);
-    });
+      parts.push(`<path d="${path || "M0,0"}" fill="none" stroke="${color}" stroke-width="${u.series[series].width}" stroke-linejoin="round" stroke-dasharray="${dash.join(" ") || "none"}"/>`);
+    }
     parts.push("</svg>");
     return svg(u.width, u.height + head, paper, [`<g transform="translate(0 ${head})">`, ...parts, "</g>"], title);
   }

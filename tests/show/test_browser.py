@@ -102,9 +102,10 @@ def test_pictures_are_saved_and_nothing_is_sent(browser: Any, run: Run, tmp_path
         page.page.on("requestfinished", lambda request: sent.append(request.url))
         page.at(1.0)
         drawn = []
-        for button in ("#save-svg", ".plot-tools >> text=SVG"):
+        plot = ".plot-tools >> text=SVG"
+        for button, which in (("#save-svg", 0), (plot, 0), (plot, -1)):
             with page.page.expect_download() as found:
-                page.page.locator(button).first.click()
+                page.page.locator(button).nth(which).click()
             drawn.append(ElementTree.parse(found.value.path()).getroot())
         assert (float(drawn[0].get("width", 0)), float(drawn[0].get("height", 0))) == page.size()
         fills = [
@@ -123,6 +124,13 @@ def test_pictures_are_saved_and_nothing_is_sent(browser: Any, run: Run, tmp_path
         wanted = np.interp(x, times, values)
         slope, level = np.polyfit(wanted, y, 1)
         assert slope < 0 and np.abs(slope * wanted + level - y).max() < 0.1
+        # The total energy is below its parts, and wider, whatever its place in the legend.
+        names = [text.text for text in drawn[2].iter(f"{SVG}text")][:3]
+        assert names == ["kinetic energy", "potential energy", "total energy"]
+        legend = [path.get("stroke") for path in drawn[2].iter(f"{SVG}path")][:3]
+        curves = drawn[2].findall(f".//{SVG}svg/{SVG}path")
+        assert [path.get("stroke") for path in curves] == [legend[2], *legend[:2]]
+        assert float(curves[0].get("stroke-width", 0)) > float(curves[1].get("stroke-width", 0))
         assert b"/Subtype /Image" not in page.page.pdf()
         assert page.page.evaluate(SENT) == ["connect-src", "img-src", "script-src-elem"]
         assert not [url for url in sent if "invalid" in url]
