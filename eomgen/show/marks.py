@@ -176,14 +176,15 @@ def _marks(picture: Picture, element: Element) -> Iterator[Mark]:
 
 
 def _ground(line: GroundLine, dimensions: int) -> Mark:
-    """A line of the ground: x along it, y up."""
+    """A line of the ground: x along it, y up. In the plane all that is below is ground."""
     at = [0.0] * dimensions
     if dimensions == 3:
         at[1 - line.axis] = line.across
     along, up = (constant(*np.eye(dimensions)[k]) for k in (line.axis, dimensions - 1))
     origin = Attachment(WORLD_INDEX, constant(*at))
     frame = Turned(origin, WORLD_INDEX, along, up, Constant(1.0))
-    return Mark(frame, (symbols.Line(line.points, ink=0.4),), "fixed")
+    fill = symbols.GROUND if dimensions == 2 else None
+    return Mark(frame, (symbols.Line(line.points, ink=0.4, fill=fill),), "fixed")
 
 
 def _at_joint(picture: Picture, element: AtJoint, joint: DrawnJoint) -> Iterator[Mark]:

@@ -10,8 +10,9 @@ from matplotlib.patches import Polygon as Patch
 from eomgen.scene.look import BARE
 from eomgen.show.motion import INSTANTS, MOST_MARKS, Array, Motion, instants, paths
 from eomgen.show.outlines import outline, turned
-from eomgen.show.strokes import Sight, strokes
+from eomgen.show.strokes import Sight, Stroke, strokes
 from eomgen.show.style import ink_on, mixed
+from eomgen.show.symbols import GROUND
 
 SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
@@ -19,8 +20,8 @@ SPREAD = 20
 LAYERS = {"fixed": 1.2, "back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
 """Order in which lines are drawn; the bodies at the last time have 2 + INSTANTS."""
 
-FILL, SURFACE = 0.08, 0.4
-"""Strength of the ink of fixed objects: their inside and their surface."""
+SURFACE = 0.4
+"""Strength of the ink of the surface of fixed objects."""
 
 
 def draw_plane(
@@ -65,10 +66,14 @@ def draw_symbols(axes: Axes, motion: Motion, row: int, eye: Array) -> None:
         size = float(np.ptp(stroke.points, axis=0).max())
         small = not line.dashed and size <= motion.camera.height
         seen_whole = stroke.layer != "fixed" or small
+        closed = bool(np.allclose(stroke.points[0], stroke.points[-1]))
+        face = None if line.fill is None else mixed(paper, ink_on(paper), line.fill)
+        if face is not None and not closed:
+            _fill_below(axes, stroke, face, SPREAD * max(size, motion.camera.height))
         outline = Patch(
             stroke.points,
-            closed=bool(np.allclose(stroke.points[0], stroke.points[-1])),
-            fc="none" if line.fill is None else mixed(paper, ink_on(paper), line.fill),
+            closed=closed,
+            fc=face if face is not None and closed else "none",
             ec=mixed(paper, ink_on(paper), line.ink),
             lw=line.weight,
             ls=":" if line.dashed else "-",
@@ -77,6 +82,13 @@ def draw_symbols(axes: Axes, motion: Motion, row: int, eye: Array) -> None:
             zorder=order,
         )
         (axes.add_patch if seen_whole else axes.add_artist)(outline)
+
+
+def _fill_below(axes: Axes, stroke: Stroke, face: str, deep: float) -> None:
+    """Fill what is below a line, m, without extending the view."""
+    (left, *_), (right, *_), low = stroke.points[0], stroke.points[-1], stroke.points[:, 1].min()
+    corners = np.vstack([stroke.points, [(right, low - deep), (left, low - deep)]])
+    axes.add_artist(Patch(corners, facecolor=face, edgecolor="none", zorder=0.4))
 
 
 def _draw_planes(axes: Axes, motion: Motion) -> None:
@@ -92,7 +104,7 @@ def _draw_planes(axes: Axes, motion: Motion) -> None:
         along = far * np.array([-normal[1], normal[0]])
         ends, behind = np.array([foot - along, foot + along]), (abs(gap) + far) * normal
         corners = np.concatenate([ends, ends[::-1] - behind])
-        colour = mixed(paper, ink, FILL)
+        colour = mixed(paper, ink, GROUND)
         axes.add_artist(Patch(corners, facecolor=colour, edgecolor="none", zorder=0.4))
         line = Line2D(*ends.T, color=mixed(paper, ink, SURFACE), linewidth=1.0, zorder=1.5)
         axes.add_artist(line)

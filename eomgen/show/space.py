@@ -12,10 +12,11 @@ from matplotlib.colors import to_rgb
 
 from eomgen.scene.look import BARE
 from eomgen.show.motion import MOST_MARKS, Array, Motion, instants, paths
-from eomgen.show.plane import FILL, SURFACE, draw_symbols
+from eomgen.show.plane import SURFACE, draw_symbols
 from eomgen.show.raster import frame_around, render_solids
 from eomgen.show.solid import solids
 from eomgen.show.style import FAINT, ink_on, mixed
+from eomgen.show.symbols import GROUND
 from eomgen.show.view import Cast, Floor, cast_of, eye_axes, floor_under, look, patches
 
 BUDGET = 2500
@@ -123,7 +124,7 @@ def _draw_patches(axes: Axes, squares: Array, eye: Array, paper: str) -> None:
     axes.add_collection(
         PolyCollection(
             list((squares @ eye.T)[..., :2]),
-            facecolors=(*to_rgb(ink_on(paper)), FILL / 2),
+            facecolors=(*to_rgb(ink_on(paper)), GROUND / 2),
             edgecolors=mixed(paper, ink_on(paper), SURFACE),
             linewidths=0.8,
             zorder=1.0,

@@ -21,6 +21,8 @@ ROUND = 12
 """Points of a turn in space."""
 TURNS = 1.75
 """Turns of the spiral of a torsion spring."""
+GROUND = 0.08
+"""Strength of the inside of what is fixed."""
 LEAD = 0.12
 """Straight part at each end of a coil or damper, relative to its length."""
 
@@ -31,7 +33,8 @@ class Line:
 
     weight  width relative to that of an ordinary line
     ink     strength, from 0 to 1
-    fill    strength of its inside, 0 for paper; None: it has none
+    fill    strength of its inside, 0 for paper, and of all that is below it if it is open; None: it
+            has none
     dashed  whether it shows something that is no thing
     """
 
@@ -215,7 +218,7 @@ CENTRE: Symbol = (
 BALL: Symbol = (Line(arc(), 0.8, 0.45),)
 SURFACE: Symbol = (Line(arc(), 0.8, 0.4),)
 """The surface of an obstacle."""
-SOLID: Symbol = (Line(arc(), 0.8, 0.4, fill=0.08),)
+SOLID: Symbol = (Line(arc(), 0.8, 0.4, fill=GROUND),)
 """A fixed ball."""
 REACH: Symbol = (Line(arc(count=120), 0.8, 0.3, dashed=True),)
 WHEEL: Symbol = (

@@ -8,6 +8,7 @@ const makeElements = (scene, mixed) => {
   const LAYERS = { fixed: -21, back: -20, middle: -20, front: 40 };
   const WIDTH = 1.8; // pixels of an ordinary line
   const [TAUT, WIDEST] = [1e-3, 0.3];
+  const [GROUND, BEYOND] = [-60, 4]; // below what the grid is on, and to so many heights of the view
   const painted = []; // lines with the strength of their ink
 
   // Along, across it in the picture, and across both; none if the first has no length.
@@ -83,6 +84,8 @@ const makeElements = (scene, mixed) => {
     });
   }
 
+  const isOpen = ({ points, fill }) => fill > 0 && String(points[0]) !== String(points[points.length - 1]);
+
   // Points of a line of a symbol as pairs of ends, each moved by `spot`.
   const pieces = ({ points, dashed }, values, spot) =>
     (dashed ? lines.dashes : lines.pairs)(points.flatMap((point) => spot(vector(point, values))));
@@ -132,8 +135,31 @@ const makeElements = (scene, mixed) => {
     };
   });
 
+  // What is below ground in the plane, however far the view shows it: below its line, which is open.
+  const below = marks.flatMap((mark) => symbols[mark.symbol].filter(isOpen).map(({ points, fill }) => {
+    const geometry = new THREE.BufferGeometry();
+    const corners = new Float32Array(6 * points.length);
+    geometry.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+    geometry.setIndex(points.slice(1).flatMap((_, i) => [0, 2, 1, 1, 2, 3].map((k) => 2 * i + k)));
+    const mesh = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, depthWrite: false }));
+    mesh.frustumCulled = false;
+    mesh.renderOrder = GROUND;
+    painted.push([{ setColor: (color) => mesh.material.color.copy(color) }, fill]);
+    scene.add(mesh);
+    return (now) => {
+      const [[at, [x, y]]] = FRAMES[mark.kind](mark, now);
+      const spots = points.map((point) => {
+        const [along, up] = vector(point, now.values);
+        return add(at, add(scaled(x, along), scaled(y, up)));
+      });
+      const deep = Math.min(now.view.middle()[1], ...spots.map(([, height]) => height)) - (BEYOND * now.view.height) / now.view.zoom;
+      spots.forEach(([aside, height], i) => corners.set([aside, height, 0, aside, deep, 0], 6 * i));
+      geometry.attributes.position.needsUpdate = true;
+    };
+  }));
+
   return {
     paint: () => painted.forEach(([line, ink]) => line.setColor(mixed(ink))),
-    draw: (now) => [...placed, ...solid].forEach((update) => update(now)),
+    draw: (now) => [...placed, ...solid, ...below].forEach((update) => update(now)),
   };
 };

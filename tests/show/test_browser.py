@@ -10,10 +10,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from browser import check_page, chromium, missing, opened
+from matplotlib.patches import Polygon
+from matplotlib.path import Path as Outline
 from notebook import cells
 
 import eomgen
 from eomgen.api.runs import Run
+from eomgen.show.figure import draw_motion
 from eomgen.show.gallery import Exhibit, gallery_page, thumbnail
 from eomgen.show.page import render_page, save_page
 
@@ -140,6 +143,46 @@ def test_pictures_are_saved_and_nothing_is_sent(browser: Any, run: Run, tmp_path
 
 
 SVG = "{http://www.w3.org/2000/svg}"
+
+
+HILLS = """\
+name = "hills"
+bodies = [{ name = "ball", mass = 1.0, inertia_com = 0.01 }]
+joints = [{ name = "flight", type = "planar", parent = "world", child = "ball" }]
+parameters = { high = 0.3 }
+initial = { q = { flight_y = 1.0 }, v = { flight_x_dot = 2.0 } }
+[[effects]]
+type = "contact"
+name = "ground"
+body = "ball"
+against = "heights"
+height = "high*sin(2*x)"
+radius = 0.1
+law = "spring_damper"
+stiffness = 1e4
+"""
+
+
+def test_ground_is_full_below_its_line(browser: Any, tmp_path: Path) -> None:
+    """On a page, in a picture that is saved from it, and in a figure."""
+    run = eomgen.simulate(HILLS, t_end=0.5, samples=11)
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    places = np.array(
+        [(x, y) for x in np.linspace(-0.5, 1.4, 9) for y in (-0.9, -0.31, -0.1, 0.2, 0.5)]
+    )
+    ground = places[:, 1] < 0.3 * np.sin(2 * places[:, 0])
+    with opened(browser, tmp_path / "page.html") as found:
+        found.at(0.1)
+        with found.page.expect_download() as saved:
+            found.page.click("#save-svg")
+        seen = found.page.evaluate("(all) => all.map(eomgen.toScreen)", places.tolist())
+        drawn = ElementTree.parse(saved.value.path()).iter(f"{SVG}path")
+    first = next(path for path in drawn if path.get("fill") not in (None, "none"))
+    faces = [Outline(face) for face in corners(first.get("d", "")).reshape(-1, 3, 2)]
+    assert (np.any([face.contains_points(seen) for face in faces], axis=0) == ground).all()
+    axes = draw_motion(run.motion).axes[0]
+    below = [p for p in axes.get_children() if isinstance(p, Polygon) and p.zorder < 0.5]
+    assert len(below) == 1 and (Outline(below[0].get_xy()).contains_points(places) == ground).all()
 
 
 def corners(path: str) -> np.ndarray:
