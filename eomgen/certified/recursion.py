@@ -206,19 +206,22 @@ class _Writer:
             case Root(of):
                 return f"(s{of}[k] - dot_from_1(s{i}, s{i}[1:])) * i{i} / 2"
             case Solution(_, _, terms, below):
-                parts = []
-                for sign, u, v in terms:
-                    if u not in self.place:
-                        continue
-                    if v in self.place:
-                        parts.append((sign, f"dot_from_1(u{u}, s{v}[:k])"))
-                    else:
-                        factor = "" if v is None else f" * {self.fixed[v]}"
-                        parts.append((sign, f"k * s{u}[k]{factor}"))
+                parts = self._slopes_of(terms, "dot_from_1(u{0}, s{1}[:k])", "k * s{0}[k]")
                 if below in self.place:
                     parts.append((-1, f"dot_from_1(u{i}, s{below}[1:k])"))
                 text = f"({_signed(parts)}) / k"
                 return text if below is None else f"{text} * i{below}"
+
+    def _slopes_of(self, terms: Sequence[Term], both: str, one: str) -> list[tuple[int, str]]:
+        """Signed texts of u' v: `both` if u and v move, else `one`, times v."""
+        parts = []
+        for sign, u, v in terms:
+            if u in self.place and v in self.place:
+                parts.append((sign, both.format(u, v)))
+            elif u in self.place:
+                factor = "" if v is None else f" * {self.fixed[v]}"
+                parts.append((sign, one.format(u) + factor))
+        return parts
 
     def _sum(self, terms: Sequence[Term]) -> str:
         parts = []
@@ -265,15 +268,7 @@ class _Writer:
             case Root(of):
                 return f"(d{of}[k] / 2 - dot_from_1(s{i}, d{i})) * i{i}"
             case Solution(_, _, terms, below):
-                parts = []
-                for sign, u, v in terms:
-                    if u not in self.place:
-                        continue
-                    if v in self.place:
-                        parts.append((sign, f"dot(s{v}, d{u})"))
-                    else:
-                        factor = "" if v is None else f" * {self.fixed[v]}"
-                        parts.append((sign, f"d{u}[k]{factor}"))
+                parts = self._slopes_of(terms, "dot(s{1}, d{0})", "d{0}[k]")
                 if below in self.place:
                     parts.append((-1, f"dot_from_1(s{below}, d{i})"))
                 text = _signed(parts)
