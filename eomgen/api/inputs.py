@@ -26,7 +26,7 @@ from eomgen.language.formula import (
     names_in,
     parse,
 )
-from eomgen.model.inputs import all_inputs, with_formulas
+from eomgen.model.inputs import all_inputs, with_formulas, with_held_inputs
 from eomgen.run.inputs import InputsOfTime, Table
 from eomgen.run.problem import FloatArray
 from eomgen.scene.schema import Scene
@@ -181,9 +181,14 @@ def _by_kind(
             f"{argument}: {type(inputs).__name__} is none; give values by name, a DataFrame with a "
             "column t, or the path of a table"
         )
+    driven = with_held_inputs(scene)[1]
     for name, value in by_name.items():
         name = identifier(name)
         check_name(name, known, argument, "input")
+        if name in driven:
+            raise RunError(
+                f"{argument}: the controller '{driven[name]}' drives '{name}'; give no value to it"
+            )
         if callable(value):
             varying[name] = value
         elif isinstance(value, str):

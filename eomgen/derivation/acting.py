@@ -56,7 +56,7 @@ def effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator
         lines = equations_of(derived.definitions)
         if derived.kept:
             lines = _loads_as_they_are(derived)
-        lines += [Equation(symbol, rate) for symbol, rate in derived.rates]
+        lines += [Equation(*pair) for pair in derived.samples or derived.rates]
         yield Step(
             "force" if derived.falls else "effect",
             f"Effect `{derived.effect.name}` ({derived.effect.type.replace('_', ' ')})",

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes
+from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes, SamplingMechanism, sampled
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import OF_SCENE, Expr, names_of_scene, of_scene, real
 from eomgen.language.formula import Name
@@ -44,6 +44,7 @@ class DerivedEffect:
     contacts     its rigid contacts
     bodies       the bodies whose pose or motion it uses
     slides       whether the joints on which it acts are prismatic; None for some of them, or none
+    samples      what samples give its extra states
     """
 
     effect: Effect
@@ -54,6 +55,7 @@ class DerivedEffect:
     contacts: tuple[Contact, ...]
     bodies: tuple[str, ...]
     slides: bool | None = None
+    samples: tuple[Definition, ...] = ()
 
     @property
     def falls(self) -> bool:
@@ -93,8 +95,29 @@ def _derived(model: Model, effect: Effect) -> DerivedEffect:
     slides = next(iter(slide)) if len(slide) == 1 else None
     bodies = tuple(notes.bodies)
     return DerivedEffect(
-        effect, tuple(definitions), tuple(loads), kept, rates, contacts, bodies, slides
+        effect,
+        tuple(definitions),
+        tuple(loads),
+        kept,
+        rates,
+        contacts,
+        bodies,
+        slides,
+        _samples(model, effect),
     )
+
+
+def _samples(model: Model, effect: Effect) -> tuple[Definition, ...]:
+    """What a sample gives each state that it sets, after the symbols that this uses."""
+    if (sampling := effect.sampling()) is None:
+        return ()
+    notes = Notes(effect.name)
+    mechanism: Any = SamplingMechanism(model, notes)
+    noise = {name: real(f"n_{name}") for name in sampling.noisy}
+    names = (*sampling.sets, *sampling.holds)
+    found = effect.samples(mechanism, noise)
+    given = ((sampled(name), x) for name, x in zip(names, found, strict=True))
+    return (*notes.definitions, *given)
 
 
 def _run(

@@ -181,6 +181,24 @@ class NamingMechanism(SymbolicMechanism):
         return symbols
 
 
+class SamplingMechanism(NamingMechanism):
+    """The same at a sample, whose readings have symbols of their own."""
+
+    def value(self, formula: Formula, **names: Expr) -> Expr:
+        """A quantity over the names of the scene and readings."""
+        return super().value(formula, **{name: sampled(name) for name in names})
+
+    def rounded(self, value: Expr, quantum: Expr) -> Expr:
+        """The nearest multiple of a quantum."""
+        return quantum * sp.Function("round", real=True)(value / quantum)
+
+
+def sampled(name: str) -> Expr:
+    """What a sample gives a state."""
+    base, underscore, rest = name.partition("_")
+    return real(f"{base}^+{underscore}{rest}")
+
+
 def position_symbols(body: str, dimensions: int) -> tuple[Expr, ...]:
     """Symbols of the place of a body's centre of mass in the world."""
     return tuple(real(f"{axis}_{body}") for axis in AXES[:dimensions])

@@ -16,6 +16,9 @@ from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 
+ROUNDING = 1.5 * 2.0**52
+"""Added to a number and taken away again, it leaves the nearest whole number."""
+
 
 @dataclass(frozen=True)
 class Values:
@@ -156,6 +159,11 @@ class NamedModel:
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas."""
         return self.scalars.call(function, *arguments)
+
+    def rounded(self, value: Scalar, quantum: Scalar) -> Scalar:
+        """The nearest multiple of a quantum."""
+        whole = self.number(ROUNDING)
+        return quantum * ((value / quantum + whole) - whole)
 
     def called(self, letter: str, *values: Scalar) -> Vector:
         """The values themselves."""

@@ -87,8 +87,35 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     rates, forces = follow_recursion(model, at.known)
     assert_close(forces, at.solver.applied_force)
     assert_close(rates, at.solver.articulated_forward())
-    states = [at.known[dotted(x.name)] for x in model.extra]
+    states = [at.known.get(dotted(x.name), 0.0) for x in model.extra]  # samples are held
     assert_close(states, at.solver.state_rates)
+
+
+SAMPLED = """
+name = "sampled"
+inputs = ["wish"]
+bodies = [{ name = "cart", mass = 1.0, inertia_com = 0 }]
+joints = [{ name = "rail", type = "prismatic", parent = "world", child = "cart", axis = [1, 0] }]
+[[effects]]
+type = "sampled_controller"
+name = "hold"
+period = 0.02
+sensors.eye = { value = "rail_slide", noise = 0.01, quantum = 1e-3 }
+states.before = { next = "eye" }
+inputs.wish = "-3*eye - before"
+torques.rail = "-2*eye"
+"""
+
+
+def test_what_samples_set() -> None:
+    """Formulas of a sample use its readings, which are rounded."""
+    (step,) = (s for s in eomgen.derive(SAMPLED).steps if "Effect `hold`" in s.title)
+    assert [f"{e.left} = {e.right}" for e in step.equations[1:]] == [
+        "eye^+ = hold_eye_quantum*round((hold_eye_noise*n_eye + s_rail)/hold_eye_quantum)",
+        "before^+ = eye^+",
+        "wish^+ = -before - 3*eye^+",
+        "hold^+_rail = -2*eye^+",
+    ]
 
 
 HELD = """

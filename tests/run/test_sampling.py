@@ -197,6 +197,12 @@ def test_what_is_wrong_is_said_in_a_line(keys: EFFECT, said: str) -> None:
     assert len(str(error.value).splitlines()) == 1
 
 
+@pytest.mark.parametrize("value", [1.0, "2*t", lambda t: t])
+def test_an_input_that_is_driven_takes_no_value(value: Any) -> None:
+    with pytest.raises(EomgenError, match="inputs: the controller 'balance' drives 'push'; give"):
+        eomgen.simulate(balanced(), inputs={"push": value})
+
+
 def test_two_controllers_do_not_drive_one_input() -> None:
     scene = balanced()
     other = eomgen.entries.SampledController(name="other", period=1.0, inputs={"push": "1"})

@@ -229,6 +229,9 @@ class Mechanism(Protocol):
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """Value of a function of `scalars.functions.FUNCTIONS`."""
 
+    def rounded(self, value: Scalar, quantum: Scalar) -> Scalar:
+        """The multiple of `quantum` that is nearest to a value."""
+
     def called(self, letter: str, *values: Scalar) -> Vector:
         """The values themselves, a scalar or the components of a vector. A derivation shows them by
         this letter, with their formula beside it.

@@ -23,8 +23,6 @@ MOST = 100
 """Greatest number of sensors, of states, or of driven inputs of one controller."""
 LONGEST = 100
 """Greatest delay in periods."""
-ROUNDING = 1.5 * 2.0**52
-"""Added to a number and taken away again, it leaves the nearest whole number."""
 
 
 class SensorTable(Table):
@@ -48,8 +46,7 @@ class SensorTable(Table):
             found = found + mechanism.value(self.noise) * noise
         if is_zero(self.quantum):
             return found
-        quantum, whole = mechanism.value(self.quantum), mechanism.number(ROUNDING)
-        return quantum * ((found / quantum + whole) - whole)
+        return mechanism.rounded(found, mechanism.value(self.quantum))
 
 
 class DiscreteStateTable(Table):
@@ -84,6 +81,11 @@ sensors = { angle = { value = "elbow_angle", noise = 1e-3, quantum = 1e-3 } }
 states = { before = { next = "angle" } }
 torques = { elbow = "-5*angle - 40*(angle - before)" }
 """
+    told = (
+        "At equal times a sample gives its readings, its states, and after its delay the inputs "
+        "and torques that it holds new values, marked by +. Between samples they stay as they are. "
+        "n is normal noise of variance 1."
+    )
     joint_fields = ("torques",)
 
     type: Literal["sampled_controller"]
