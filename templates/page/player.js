@@ -1,23 +1,10 @@
 // The page itself: replays the recorded run or integrates a live motion, and wires the controls.
 
 const player = (() => {
-  const { byId, element } = tools;
+  const { byId } = tools;
   const LONGEST = 0.1; // s; a page that was hidden goes on where it was
   const [BUDGET, SHARE] = [24, 0.5]; // ms of each picture that steps may take, or a part of it
   const WARM = 250; // times 8 ms before a live motion
-  const SHOWS = [
-    ["traces", "Traces", true], ["joints", "Joints", true], ["centres", "Centres of mass", false],
-    ["shadows", "Shadows", true], ["forces", "Forces of effects", false], ["torques", "Torques of effects", false],
-    ["velocities", "Velocities", false], ["reactions", "Joint forces", false],
-  ];
-  // What this mechanism has nothing of is not offered.
-  const offered = {
-    shadows: Boolean(DATA.drawing.floor),
-    forces: DATA.loads.length > 0,
-    torques: DATA.loads.length > 0,
-    velocities: Boolean(mechanism.bodyVelocities),
-    reactions: Boolean(mechanism.jointForces),
-  };
   const canvas = byId("stage");
   const stage = makeStage(canvas, mechanism);
   const replay = makeReplay(mechanism);
@@ -35,7 +22,7 @@ const player = (() => {
     remark: "", // of the engine, as it is shown
     frames: [], // times of the last pictures
   };
-  const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
+  const show = makeShows(mechanism, () => redraw());
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
   const poses = engine && makePoses(mechanism, place);
@@ -349,15 +336,6 @@ const player = (() => {
   const plotting = makePlotting({ mechanism, replay, seek, put: engine && place });
   const comparison = makeComparison(mechanism, DATA, plotting.channels);
 
-  for (const [key, text, on] of SHOWS) {
-    if (offered[key] === false) continue;
-    const box = element("input", { type: "checkbox", id: `show-${key}`, checked: on });
-    box.addEventListener("change", () => {
-      show[key] = box.checked;
-      redraw();
-    });
-    byId("shows").append(element("label", {}, box, text));
-  }
   byId("theme").addEventListener("click", () => {
     const { dataset } = document.documentElement;
     const prefersDark = matchMedia("(prefers-color-scheme: dark)").matches;
@@ -424,34 +402,3 @@ const player = (() => {
   if (!sharing?.open(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
   return { stage, clock, current, goTo, plotting, engine, show, comparison };
 })();
-
-// What tests and curious people may read of the page.
-window.eomgen = Object.freeze({
-  get mode() { return player.clock.mode; },
-  get playing() { return player.clock.playing; },
-  get time() { return player.current().t; },
-  get state() { return Array.from(player.current().y); },
-  get parameters() { return Array.from(player.current().p); },
-  get inputs() { return Array.from(player.current().u); },
-  get lit() { return player.show.lit ?? null; }, // the effect whose arrows and terms are marked
-  get error() { return player.engine?.error ?? null; },
-  get step() { return player.engine ? { method: player.engine.method, seconds: player.engine.dt, ms: player.engine.cost() } : null; },
-  // The second run, which is kept beside, at the time that is shown.
-  get kept() {
-    const { engine, given } = player.comparison;
-    return engine ? { method: engine.method, parameters: Array.from(engine.p), state: Array.from(given(player.current().t)[1]) } : null;
-  },
-  // World positions of the centres of mass, m, and where they are in the picture, CSS pixels.
-  get centers() { return DATA.bodies.map((_, k) => tools.center(player.stage.poses(), k).slice(0, DATA.dimensions)); },
-  get screen() { return DATA.bodies.map((_, k) => player.stage.toScreen(tools.center(player.stage.poses(), k))); },
-  toScreen: (point) => player.stage.toScreen(point),
-  pick: (x, y) => player.stage.pick(x, y),
-  get view() { const { zoom, x, y, azimuth, elevation, height } = player.stage.view; return { zoom, x, y, azimuth, elevation, height }; },
-  // Pictures a second over the last ones.
-  get rate() {
-    const { frames } = player.clock;
-    return frames.length > 1 ? (1000 * (frames.length - 1)) / (frames[frames.length - 1] - frames[0]) : 0;
-  },
-  picture: player.stage.failed === "",
-  goTo: (time) => player.goTo(time),
-});
