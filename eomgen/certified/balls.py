@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from eomgen.base.errors import RunError
 
+flint: Any
 try:
-    import flint
+    flint = import_module("flint")
 except ImportError:  # said where a proof is asked for
     flint = None
 
