@@ -4,6 +4,7 @@ them.
 
 import ctypes
 import math
+import re
 import shutil
 from collections.abc import Callable
 from functools import cache
@@ -210,8 +211,15 @@ def test_leapfrog_has_the_bits_of_python(scene: str, method: str) -> None:
 def test_bits_of_built_in_scenes(scene: str, method: str) -> None:
     large = scene in ("ragdoll", "walker_motors", "human_figure", "stiff_beam")
     for rtol in (1e-3, 1e-7):
-        own = {"rtol": rtol} if method in ADAPTIVE else {"dt": 1e-3, "unstable": rtol > 1e-4}
+        own: Options = {"rtol": rtol} if method in ADAPTIVE else {"dt": 1e-3}
+        if method in EXPLICIT:
+            own["unstable"] = rtol > 1e-4
         end = 0.1 if large or method in ADAPTIVE[2:] else 1.0
+        try:
+            eomgen.simulate(scene, t_end=1e-3, integrator=method, **own)
+        except eomgen.RunError as error:
+            assert re.match("integrator: (leapfrog|BDF) ", str(error))
+            return  # it does not suit the scene
         assert_same(*both(scene, t_end=end, integrator=method, samples=137, **own))
 
 
