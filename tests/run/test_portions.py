@@ -81,7 +81,8 @@ def test_steps_before_an_error_are_kept(method: str) -> None:
     many = integrate(pendulum(0.505), method, 2.0, **how)
     each = integrate(pendulum(0.505), method, 2.0, **how, tally=Tally(check))
     assert many.outcome == each.outcome and "nothing there" in many.message
-    assert many.t.tolist() == each.t.tolist() and abs(many.t[-1] - 0.5) < 0.1
+    near = 1e-9 if "4" in method else 0.1
+    assert many.t.tolist() == each.t.tolist() and abs(many.t[-1] - 0.5) < near
     assert many.y.tobytes() == each.y.tobytes() and many.counts == each.counts
     assert len(seen) == many.counts["steps"] > 5
     if "dt" in how:
