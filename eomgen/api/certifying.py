@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Values, check_name, model_of, named, read, values_of
+from eomgen.api.given import Values, model_of, named, read, values_of
 from eomgen.api.inputs import constant_inputs
 from eomgen.api.options import CertifyOptions
 from eomgen.api.public import public
@@ -166,7 +166,6 @@ def _widths(
     known = (*module.STATES, *module.PARAMETERS)
     widths = named(uncertain, known, argument, "state or parameter")
     for name, width in widths.items():
-        check_name(name, known, argument, "state or parameter")
         if width < 0:
             raise RunError(f"{argument}: {name} has a negative width; give how far it may be off")
     return widths

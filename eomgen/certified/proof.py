@@ -1,7 +1,7 @@
 """Boxes that hold a motion at given times, by proven steps."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.certified.balls import (
@@ -30,9 +30,6 @@ FIRST = 1e-3
 LOST = 1e-2
 """A radius that grew by this much from the start is beyond what is to be proven."""
 
-Hear = Callable[[float], None]
-"""Told of the time that is reached."""
-
 
 @dataclass(frozen=True, eq=False)
 class Proof:
@@ -42,16 +39,12 @@ class Proof:
     reached  up to which time the motion is proven, s
     plan     with which this was proven
     steps    number of steps, of the last try
-    tries    number of tries
-    largest  a guess of how much the motion magnifies a change of its start
     """
 
     rows: list[Balls]
     reached: float
     plan: Plan
     steps: int
-    tries: int
-    largest: float
 
     @property
     def radius(self) -> float:
@@ -65,7 +58,6 @@ def prove(
     start: Balls,
     times: Sequence[float],
     wanted: float,
-    hear: Hear = lambda t: None,
 ) -> Proof:
     """Boxes that hold the motion from every state in the box `start` at increasing times,
     with radii of at most `wanted` if the start is a point.
@@ -80,8 +72,8 @@ def prove(
     plan = _plan(wanted * SPARE, guess, bits, times[-1] - times[0])
     exact = all(x.is_exact() for x in start)
     found: Proof | None = None
-    for tries in range(1, TRIES + 1):
-        new = replace(_proven(motion, values, start, times, plan, guess, hear), tries=tries)
+    for _ in range(TRIES):
+        new = _proven(motion, values, start, times, plan, guess)
         if found is None or (new.reached, -new.radius) > (found.reached, -found.radius):
             found = new
         if not exact or (new.reached == times[-1] and new.radius <= wanted):
@@ -111,7 +103,6 @@ def _proven(
     times: Sequence[float],
     plan: Plan,
     guess: Growth,
-    hear: Hear,
 ) -> Proof:
     n, begin, end = len(start), times[0], times[-1]
     with precision(plan.bits):
@@ -136,8 +127,7 @@ def _proven(
             rows.append(step.box(times[len(rows)]))
         centre, spread = step.end()
         t, steps = step.until, steps + 1
-        hear(float(t))
         with precision(SHORT):
             if not max(radius(x) for x in spread.hull()) < limit:
                 break
-    return Proof(rows, min(float(t), end), plan, steps, 1, guess.largest)
+    return Proof(rows, min(float(t), end), plan, steps)

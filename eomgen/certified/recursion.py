@@ -111,6 +111,7 @@ class _Writer:
         self.place = {i: n for n, i in enumerate((*system.given.values(), *system.rules))}
         self.fixed = {i: f"fixed[{n}]" for n, i in enumerate(system.fixed)}
         self.fixed[system.one] = "one"
+        self.slopes, self.divisors = self._slopes(), self._divisors()
 
     def source(self) -> str:
         """Both functions."""
@@ -133,8 +134,8 @@ class _Writer:
             if i > system.one:
                 lines.append(f"z{i} = {self._auxiliary(rule)}")
         lines += [f"s{i} = [z{i}]" for i in self.place]
-        lines += [f"u{i} = [zero]" for i in self._slopes()]
-        lines += [f"i{i} = 1 / {self._first(i)}" for i in self._divisors()]
+        lines += [f"u{i} = [zero]" for i in self.slopes]
+        lines += [f"i{i} = 1 / {self._first(i)}" for i in self.divisors]
         n = len(self.names)
         lines.append(f"states = [[y[j]] for j in range({n})]")
         lines += ["for k in range(order):", "    if k:"]
@@ -151,12 +152,12 @@ class _Writer:
         listed = ", ".join(f"s{i}" for i in self.place)
         return [*lines, f"return states, [{listed}]"]
 
-    def _slopes(self) -> list[int]:
+    def _slopes(self) -> dict[int, None]:
         """The series u whose slopes, k u_k, are used."""
         rules = [r for r in self.system.rules.values() if isinstance(r, Solution)]
         used = {t.left for r in rules for t in r.terms if t.right is not None}
         used |= {i for i, r in self.system.rules.items() if isinstance(r, Solution) and r.below}
-        return [i for i in self.place if i in used]
+        return dict.fromkeys(i for i in self.place if i in used)
 
     def _divisors(self) -> list[int]:
         rules = self.system.rules.values()
@@ -166,7 +167,7 @@ class _Writer:
 
     def _kept(self, i: int, value: str) -> list[str]:
         lines = [f"        s{i}.append({value})"]
-        return lines + [f"        u{i}.append(k * s{i}[k])"] * (i in self._slopes())
+        return lines + [f"        u{i}.append(k * s{i}[k])"] * (i in self.slopes)
 
     def _first(self, i: int) -> str:
         return f"z{i}" if i in self.place else self.fixed.get(i, f"z{i}")
@@ -240,8 +241,7 @@ class _Writer:
         system = self.system
         lines = [f"s{i} = found[{n}]" for i, n in self.place.items()]
         lines += [
-            f"i{i} = 1 / {f's{i}[0]' if i in self.place else self.fixed[i]}"
-            for i in self._divisors()
+            f"i{i} = 1 / {f's{i}[0]' if i in self.place else self.fixed[i]}" for i in self.divisors
         ]
         lines += [f"d{i} = []" for i in self.place]
         lines += ["states = [[d] for d in direction]", "for k in range(order):"]
